@@ -10,12 +10,11 @@
 #include <set>
 #include <utility>
 
-#include "fitting/nested/nested_steps.h"
+#include "fitting/nested/nested_fit.h"
 #include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "fitting/plan/fit_driver.h"
 #include "fitting/solve/auto_weight.h"
-#include "fitting/solve/level_fit.h"
 #include "fitting/solve/space_solve.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/feature.h"
@@ -23,8 +22,8 @@
 namespace semblance {
 namespace {
 
-// Every level of the steps, coarse to fine.
-std::vector<ScheduleStep> SweepOf(const std::vector<ScheduleStep>& steps) {
+// One step at fraction 1 for every level of the steps, coarse to fine.
+std::vector<ScheduleStep> MakeSweep(const std::vector<ScheduleStep>& steps) {
   std::set<int> levels;
   for (const ScheduleStep& step : steps) {
     levels.insert(step.level);
@@ -36,8 +35,8 @@ std::vector<ScheduleStep> SweepOf(const std::vector<ScheduleStep>& steps) {
   return sweep;
 }
 
-// c + fraction (c' - c); a vertex that the solve left alone, or that stays, keeps its bits. Returns
-// the longest way.
+// Moves the vertices to c + fraction (c' - c). A vertex that did not move in the solve, or that is
+// in `stay`, keeps its exact bits. Returns the longest move.
 double WriteBack(ControlNet solved, const ScheduleStep& step, std::span<const int> stay,
                  HSplineSurface& surface) {
   ControlNet net = surface.Net(step.level);
@@ -54,8 +53,10 @@ double WriteBack(ControlNet solved, const ScheduleStep& step, std::span<const in
   return longest;
 }
 
-// The weight of a PriorTerm that holds features.
+// The weight of the PriorTerm that holds features; 0 for rules without one.
 double FeaturePriorWeight(const FeatureRule& rule) {
+  // Holds frozen features in the solve, whose offsets are then restored; larger weights cost
+  // digits.
   constexpr double kFrozen = 1e6;
   const auto* const weighted = std::get_if<WeightedFeatures>(&rule);
   return weighted != nullptr                            ? weighted->weight
@@ -63,7 +64,8 @@ double FeaturePriorWeight(const FeatureRule& rule) {
                                                         : 0;
 }
 
-// Neither bends nor holds anything: where there are no points, the surface could do what it likes.
+// Returns whether all terms are terms of the points, so that nothing determines the surface where
+// there are no points.
 bool AreOfPointsAlone(std::span<const Term> terms) {
   return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
     return WeightOf(term) == 0 || std::holds_alternative<PointTerm>(term) ||
@@ -71,32 +73,33 @@ bool AreOfPointsAlone(std::span<const Term> terms) {
   });
 }
 
-// Of the thin-plate energy, length_mm 1, beside points of weight 1: that which halves waves of two
-// points' spacings. Shorter ones are not in the points, and longer ones it hardly changes, for what
-// it takes falls with the fourth power of the length.
-double WeightOfSpacing(const Vec2& lengths_mm, std::size_t points) {
+// The weight of the thin-plate energy (length_mm 1, points of weight 1) that halves waves as long
+// as two spacings of points. The points do not contain shorter waves. Longer ones hardly change,
+// because the damping falls with the fourth power of the length.
+double SpacingWeight(const Vec2& lengths_mm, std::size_t points) {
   const double spacing_mm = std::sqrt(lengths_mm.prod() / static_cast<double>(points));
   return std::pow(spacing_mm / std::numbers::pi, 4);
 }
 
-// An adaptive plan may split patches until their points do not determine their vertices.
+// Returns whether an adaptive plan may split patches until the points do not determine the
+// vertices.
 bool MaySplitTooFar(const FitOptions& options, const HSplineShape& shape, std::size_t points) {
-  constexpr double kEnough = 16;  // points for a patch, which has as many vertices
+  constexpr double kPointsPerPatch = 16;  // as many as a patch has vertices
   const auto* const plan = std::get_if<AdaptivePlan>(&options.plan);
   return plan != nullptr &&
-         static_cast<double>(points) < kEnough * shape.PatchesU(plan->finest) *
+         static_cast<double>(points) < kPointsPerPatch * shape.PatchesU(plan->finest) *
                                            static_cast<double>(shape.PatchesV(plan->finest));
 }
 
-// The options', and those that the plan and the features need.
-std::vector<Term> TermsOf(const FitOptions& options, const HSplineSurface& rest,
-                          std::size_t points) {
+// The terms of the options, and those that the plan and the features need.
+std::vector<Term> MakeTerms(const FitOptions& options, const HSplineSurface& rest,
+                            std::size_t points) {
   std::vector<Term> terms = options.terms;
   const Vec2 lengths_mm = MeanLengths(rest);
   if (AreOfPointsAlone(terms) && MaySplitTooFar(options, rest.shape(), points) &&
       lengths_mm.allFinite() && lengths_mm.minCoeff() > 0) {
     terms.emplace_back(SmoothnessTerm{
-        .weight = PointWeight(terms) * WeightOfSpacing(lengths_mm, points), .length_mm = 1});
+        .weight = PointWeight(terms) * SpacingWeight(lengths_mm, points), .length_mm = 1});
   }
   if (const double weight = FeaturePriorWeight(options.features); weight > 0) {
     terms.emplace_back(PriorTerm{.weight = weight, .held_only = true});
@@ -104,7 +107,7 @@ std::vector<Term> TermsOf(const FitOptions& options, const HSplineSurface& rest,
   return terms;
 }
 
-// The same surface, of levels 0..max_level, which must hold its offsets.
+// The same surface with levels 0 .. max_level, which must contain all of its offsets.
 HSplineSurface WithLevels(const HSplineSurface& surface, int max_level) {
   HSplineShape shape = surface.shape();
   shape.max_level = max_level;
@@ -113,11 +116,11 @@ HSplineSurface WithLevels(const HSplineSurface& surface, int max_level) {
   return same;
 }
 
-// Throws InputError for exact points that the surface does not meet.
-void CheckMet(const SpaceSolve& all, const FitTarget& target) {
+// Throws InputError if the surface misses an exact point.
+void CheckMet(const AdaptiveSolve& all, const FitTarget& target) {
   const std::vector<double> misses = all.ExactMisses();
   const auto worst = std::max_element(misses.begin(), misses.end());
-  if (worst == misses.end() || *worst <= all.LeastMiss_mm()) {
+  if (worst == misses.end() || *worst <= all.MissTolerance_mm()) {
     return;
   }
   const Vec2& uv = target.exact[static_cast<std::size_t>(worst - misses.begin())].uv;
@@ -128,7 +131,7 @@ void CheckMet(const SpaceSolve& all, const FitTarget& target) {
                   uv.x(), uv.y(), *worst));
 }
 
-// Those that were not left out, with their anchors.
+// The target without its outliers.
 FitTarget Without(std::span<const std::uint32_t> outliers, FitTarget target) {
   std::vector<FitPoint> kept;
   auto next = outliers.begin();
@@ -143,8 +146,8 @@ FitTarget Without(std::span<const std::uint32_t> outliers, FitTarget target) {
   return target;
 }
 
-// With the weight that the plan has chosen, for points of weight 1 and a length of 1 mm, and with
-// its stretch, unless a number is given.
+// Sets the `auto` weight of a smoothness term, if there is one, to the weight and stretch that the
+// plan has chosen for points of weight 1 and a length of 1 mm.
 std::vector<Term> WithSmoothness(std::span<const Term> terms, const AutoReport& chosen) {
   std::vector<Term> all(terms.begin(), terms.end());
   if (const int automatic = AutoTerm(all); automatic >= 0) {
@@ -156,8 +159,8 @@ std::vector<Term> WithSmoothness(std::span<const Term> terms, const AutoReport& 
   return all;
 }
 
-// A point that is to be met exactly is believed.
-void Believe(const FitTarget& target, std::vector<std::uint32_t>& outliers) {
+// An exact point is never an outlier.
+void KeepExactPoints(const FitTarget& target, std::vector<std::uint32_t>& outliers) {
   std::erase_if(outliers, [&](std::uint32_t k) {
     const FitPoint& point = target.points[k];
     return std::ranges::any_of(target.exact, [&](const ExactPoint& exact) {
@@ -184,7 +187,8 @@ class PointColumns {
   std::vector<double> weights_;
 };
 
-// A fit by any plan.
+// Runs a fit by any plan. The plans that fit level by level and the adaptive plan drive their
+// solves through a FitDriver, which also relaxes the points.
 class Fitter {
  public:
   Fitter(const HSplineSurface& start, const HSplineSurface& rest, const FitTarget& target,
@@ -194,7 +198,7 @@ class Fitter {
         options_(options),
         context_(context),
         result_{.surface = start},
-        driver_(rest, target, options, TermsOf(options, rest, target.points.size()), context,
+        driver_(rest, target, options, MakeTerms(options, rest, target.points.size()), context,
                 result_) {
     std::sort(features_.begin(), features_.end());
     features_.erase(std::unique(features_.begin(), features_.end()), features_.end());
@@ -207,7 +211,7 @@ class Fitter {
   }
 
  private:
-  // A plan that goes level by level, once.
+  // Runs a plan that fits level by level once.
   template <class Plan>
   void Follow(const Plan& plan) {
     const std::vector<ScheduleStep> steps = StepsOf(plan);
@@ -218,25 +222,25 @@ class Fitter {
     FollowPasses(plan.schedule, plan.max_passes, plan.tolerance_mm, plan.sweeps);
   }
 
-  // Passes over the steps while each lowers the points' distance by more than least_gain_mm, then
-  // back-fitting sweeps.
+  // Runs passes over the steps while each lowers the points' rms distance by more than
+  // least_gain_mm, and then the back-fitting sweeps.
   void FollowPasses(const std::vector<ScheduleStep>& steps, int passes, double least_gain_mm,
                     int sweeps) {
-    const std::vector<ScheduleStep> sweep = SweepOf(steps);
+    const std::vector<ScheduleStep> sweep = MakeSweep(steps);
     const std::size_t most = passes * steps.size() + sweeps * sweep.size();
     for (int pass = 0; pass < passes; ++pass) {
       const double before_mm = driver_.rms_mm();
-      TakeAll(steps, most);
+      RunSteps(steps, most);
       if (!(before_mm - driver_.rms_mm() > least_gain_mm)) {
         break;
       }
     }
     for (int k = 0; k < sweeps; ++k) {
-      TakeAll(sweep, most);
+      RunSteps(sweep, most);
     }
   }
 
-  void TakeAll(const std::vector<ScheduleStep>& steps, std::size_t most_steps) {
+  void RunSteps(const std::vector<ScheduleStep>& steps, std::size_t most_steps) {
     for (const ScheduleStep& step : steps) {
       context_.ThrowIfStopped();
       context_.Report("fit", fmt::format("level {}, fraction {}", step.level, step.fraction),
@@ -248,14 +252,14 @@ class Fitter {
     }
   }
 
-  // Those that a term holds.
+  // The features that a term holds.
   std::span<const VertexId> Held() const {
     return FeaturePriorWeight(options_.features) > 0 ? features_ : std::span<const VertexId>();
   }
 
   LevelView View(int level, const FitTarget& target) const {
-    return ViewOfLevel(result_.surface, rest_, target, level,
-                       {.aim = AimOf(options_.plan), .held = Held()});
+    return MakeLevelView(result_.surface, rest_, target, level,
+                         {.aim = AimOf(options_.plan), .held = Held()});
   }
 
   LevelSummary SolveLevel(const ScheduleStep& step, std::span<const Term> terms,
@@ -277,18 +281,19 @@ class Fitter {
 
   void Follow(const AdaptivePlan& plan) {
     const Feature features = ExtractFeature(result_.surface, "features", features_);
-    SpaceSolve all({.start = result_.surface,
-                    .rest = rest_,
-                    .target = driver_.target(),
-                    .terms = driver_.terms(),
-                    .held = Held(),
-                    .solver = options_.solver,
-                    .threads = context_.threads});
+    AdaptiveSolve all({.start = result_.surface,
+                       .rest = rest_,
+                       .target = driver_.target(),
+                       .terms = driver_.terms(),
+                       .held = Held(),
+                       .solver = options_.solver,
+                       .threads = context_.threads});
+
     const auto solve = [&](std::span<const Term>, SolveReport report) {
-      SeePoints(all);
+      UpdatePoints(all);
       const LevelSummary summary = all.Solve(SolveTolerance::kLoose, report);
       if (driver_.MovesPoints()) {
-        Take(all, features);
+        AdoptSurface(all, features);
       }
       return summary;
     };
@@ -296,19 +301,20 @@ class Fitter {
       context_.ThrowIfStopped();
       context_.Report("fit", fmt::format("{} vertices to level {}", all.dofs(), all.finest()));
       driver_.Take({.solve = solve});
-      SeePoints(all);
+      UpdatePoints(all);
     }
     driver_.Solve({.solve = [&](std::span<const Term>, SolveReport) {
-      LevelSummary summary = all.Settle();
+      LevelSummary summary = all.FinalSolve();
       CheckMet(all, driver_.target());
-      if (Take(all, features)) {
+      if (AdoptSurface(all, features)) {
         summary.rms_after_mm = PointRms(result_.surface, driver_.target(), context_.threads);
       }
       return summary;
     }});
   }
 
-  // With Ceres or exact points; without, nothing is to be driven (FitAlone).
+  // The auto plan with Ceres, further terms or exact points. (Otherwise Fit() calls FitAlone
+  // directly.)
   void Follow(const AutoPlan&) {
     const ControlNet start = result_.surface.Net(0);
     const PointColumns points(driver_.target());
@@ -320,16 +326,16 @@ class Fitter {
       driver_.Solve({.solve = [&](std::span<const Term>, SolveReport) { return level; }});
     }
     driver_.Solve({.solve = [&](std::span<const Term> terms, SolveReport) {
-      return SettleAlone(terms, start);
+      return SolveAllTerms(terms, start);
     }});
-    TellOf(result_.surface, points.Points(), alone.residual_mm, context_.threads,
-           *result_.automatic);
-    Believe(driver_.target(), result_.automatic->outliers);
+    UpdateReport(result_.surface, points.Points(), alone.residual_mm, context_.threads,
+                 *result_.automatic);
+    KeepExactPoints(driver_.target(), result_.automatic->outliers);
   }
 
-  // The minimum of all terms in the space that the auto plan has found, with its smoothness and
-  // without its outliers; with finer vertices where exact points ask for them.
-  LevelSummary SettleAlone(std::span<const Term> terms, const ControlNet& rest) {
+  // Finds the minimum of all terms in the space of the auto plan, with its smoothness and without
+  // its outliers. Finer vertices are added where exact points need them.
+  LevelSummary SolveAllTerms(std::span<const Term> terms, const ControlNet& rest) {
     context_.Report("fit", "all terms");
     const FitTarget kept = Without(result_.automatic->outliers, driver_.target());
     const std::vector<Term> weighed = WithSmoothness(terms, *result_.automatic);
@@ -338,18 +344,19 @@ class Fitter {
         exact ? WithLevels(result_.surface, FinestAllowed(options_.plan, result_.surface.shape()))
               : result_.surface;
     const HSplineSurface flat(start.shape(), rest);
-    SpaceSolve all({.start = start,
-                    .rest = flat,
-                    .target = kept,
-                    .terms = weighed,
-                    .solver = options_.solver,
-                    .threads = context_.threads,
-                    .settled = true});
+    AdaptiveSolve all({.start = start,
+                       .rest = flat,
+                       .target = kept,
+                       .terms = weighed,
+                       .solver = options_.solver,
+                       .threads = context_.threads,
+                       .final_loss_width = true});
     const AdaptivePlan where_unmet{.tolerance_mm = std::numeric_limits<double>::infinity(),
                                    .finest = start.shape().max_level};
-    LevelSummary summary = all.Settle();
+
+    LevelSummary summary = all.FinalSolve();
     while (exact && all.Refine(where_unmet)) {
-      summary = all.Settle();
+      summary = all.FinalSolve();
     }
     CheckMet(all, kept);
     result_.surface = exact ? WithLevels(all.Surface(), all.finest()) : all.Surface();
@@ -357,15 +364,16 @@ class Fitter {
     return summary;
   }
 
-  void SeePoints(SpaceSolve& all) const {
+  void UpdatePoints(AdaptiveSolve& all) const {
     if (driver_.MovesPoints()) {
-      all.SeePoints();
+      all.UpdatePoints();
     }
   }
 
-  // Of frozen features a term has held the detail as it stands in space; their offsets stay to the
-  // bit, and so turn with the coarser surface. Returns whether there are any.
-  bool Take(const SpaceSolve& all, const Feature& features) {
+  // Adopts the solved surface. A term has held frozen features in space, but their offsets must
+  // keep their exact bits and turn with the coarser surface, so they are restored. Returns whether
+  // there are any.
+  bool AdoptSurface(const AdaptiveSolve& all, const Feature& features) {
     const bool frozen =
         std::holds_alternative<FrozenFeatures>(options_.features) && !features_.empty();
     result_.surface = all.Surface();

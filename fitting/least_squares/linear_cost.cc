@@ -10,7 +10,7 @@
 namespace semblance {
 namespace {
 
-// The vertices that have a non-zero column, each once, in the order in which they are named.
+// The vertices with a non-zero column, each once, in their given order.
 std::vector<int> UsedVertices(const Eigen::MatrixXd& a, std::span<const int> vertices) {
   std::vector<int> used;
   for (std::size_t k = 0; k < vertices.size(); ++k) {

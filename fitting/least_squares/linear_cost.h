@@ -10,14 +10,14 @@
 #include <memory>
 #include <span>
 
-#include "fitting/least_squares/row_sink.h"
+#include "fitting/least_squares/qr_compression.h"
 #include "surfaces/hspline/control_net.h"
 
 namespace semblance {
 
-// Residual A X - B, row by row, x y z. X (columns of A x 3) are the control vertices in mm, one
-// parameter block of 3 each; A is rows x vertices, without unit or as its term scales it; B is
-// rows x 3. The Jacobian is the Kronecker product of A and the 3 x 3 identity.
+// Residual A X - B, row by row in the order x y z. X (vertices x 3) holds the control vertices in
+// mm, one parameter block of 3 doubles each; A is rows x vertices, scaled by its term; B is rows
+// x 3. The Jacobian is the Kronecker product of A and the 3 x 3 identity.
 class LinearCost final : public ceres::CostFunction {
  public:
   LinearCost(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b);
@@ -29,8 +29,8 @@ class LinearCost final : public ceres::CostFunction {
   Rows3 b_;
 };
 
-// Residual A x - b where x stacks the coordinates x y z of the control vertices, 3 columns of A
-// each: for terms that couple them. A is rows x 3 vertices, b has as many rows.
+// Residual A x - b for terms that couple x, y and z. The vector x stacks the coordinates x y z of
+// the control vertices, so A is rows x (3 vertices); b has as many rows.
 class CoupledCost final : public ceres::CostFunction {
  public:
   CoupledCost(std::shared_ptr<const Eigen::MatrixXd> a, Eigen::VectorXd b);
@@ -42,19 +42,20 @@ class CoupledCost final : public ceres::CostFunction {
   Eigen::VectorXd b_;
 };
 
-// Adds a CoupledCost over the vertices of `net` that `vertices` names; as AddLinearResidual.
+// Adds a CoupledCost over the vertices of `net` with the given indices, three columns of `a` each.
+// The columns of a repeated vertex are added up.
 void AddCoupledResidual(const Eigen::MatrixXd& a, Eigen::VectorXd b, std::span<const int> vertices,
                         ControlNet& net, ceres::Problem& problem);
 
-// Adds a LinearCost over the vertices of `net` that `vertices` names, one per column of `a`. A
-// vertex named twice gets the sum of its columns; one whose columns are zero is left out. `loss`
-// may be empty.
+// Adds a LinearCost over the vertices of `net` with the given indices, one per column of `a`. The
+// columns of a repeated vertex are added up, and a vertex whose columns are zero is left out.
+// `loss` may be empty.
 void AddLinearResidual(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
                        std::span<const int> vertices, std::unique_ptr<ceres::LossFunction> loss,
                        ControlNet& net, ceres::Problem& problem);
 
-// Rows become residuals over the vertices of `net`, a parameter block of 3 doubles each. Blocks
-// with more rows than columns are reduced first (qr_compression.h).
+// Adds rows to a ceres::Problem as residuals over the vertices of `net`, parameter blocks of 3
+// doubles each. Blocks with more rows than columns are compressed first (qr_compression.h).
 class ProblemSink final : public RowSink {
  public:
   ProblemSink(ControlNet& net, ceres::Problem& problem) : net_(net), problem_(problem) {}

@@ -10,9 +10,11 @@
 namespace semblance {
 namespace {
 
-constexpr Eigen::Index kSlab = 128;  // rows; with 19 columns they stay in the first cache
+// Rows; 128 x 19 doubles (19 kB) fit into the first-level cache.
+constexpr Eigen::Index kSlab = 128;
 
-// Makes the first `unknowns` columns of the top `rows` rows upper triangular by reflections.
+// Makes the first `unknowns` columns of the top `rows` rows upper triangular by Householder
+// reflections.
 void Triangulate(Eigen::Index rows, Eigen::Index unknowns, Eigen::MatrixXd& slab) {
   Eigen::VectorXd workspace(slab.cols());
   for (Eigen::Index k = 0; k < std::min(unknowns, rows - 1); ++k) {
@@ -26,8 +28,8 @@ void Triangulate(Eigen::Index rows, Eigen::Index unknowns, Eigen::MatrixXd& slab
   }
 }
 
-// The top unknowns x (unknowns + 3) of the whole triangulated [A | B].
-Eigen::MatrixXd TriangleOf(const Eigen::MatrixXd& a, const Rows3& b) {
+// The top unknowns x (unknowns + 3) of the triangulated [A | B].
+Eigen::MatrixXd Triangle(const Eigen::MatrixXd& a, const Rows3& b) {
   const Eigen::Index n = a.cols();
   Eigen::MatrixXd slab(std::min(a.rows(), std::max(kSlab, 2 * n)), n + 3);
   Eigen::Index filled = 0;
@@ -42,8 +44,8 @@ Eigen::MatrixXd TriangleOf(const Eigen::MatrixXd& a, const Rows3& b) {
   return slab.topRows(n);
 }
 
-// Rows of a rank-deficient triangle that hold nothing but rounding would pull with the misfit that
-// is left there; a pivoted decomposition drops them.
+// Drops the rows beyond the rank by a pivoted decomposition. They hold only rounding, and would
+// pull the solution by the misfit that is left in them.
 LinearRows TruncateRank(LinearRows rows) {
   const Eigen::VectorXd diagonal = rows.a.diagonal().cwiseAbs();
   if (diagonal.minCoeff() > 1e-10 * diagonal.maxCoeff()) {
@@ -64,7 +66,7 @@ LinearRows CompressRows(const Eigen::MatrixXd& a, const Rows3& b) {
   if (a.rows() <= a.cols()) {
     return {.a = a, .b = b};
   }
-  const Eigen::MatrixXd triangle = TriangleOf(a, b);
+  const Eigen::MatrixXd triangle = Triangle(a, b);
   return TruncateRank({.a = triangle.leftCols(a.cols()), .b = triangle.rightCols<3>()});
 }
 

@@ -4,25 +4,26 @@
 #include <algorithm>
 #include <new>
 
+#include "fitting/nested/lanes.h"
 #include "surfaces/base/simd.h"
 
 namespace semblance {
 namespace {
 
-// A vertex of the finer level that is odd lies on one of the coarser level and takes 1/8 6/8 1/8,
-// an even one lies between two (RefineRow).
+// Knot insertion (RefineRow): an odd vertex of the finer level lies on a coarser vertex, with
+// weights 1/8 6/8 1/8; an even one lies between two, with weights 1/2 1/2.
 constexpr double kBeside = 0.125, kOn = 0.75, kBetween = 0.5;
 
 int Wrapped(int i, int columns) { return ((i % columns) + columns) % columns; }
 
-// A row of the finer level across, between or on rows of the coarser one.
-struct RowWay {
+// The rows of the coarser level around a row of the finer level, which lies on or between them.
+struct CoarseRows {
   const double* coarse;  // column 0 of row (j + 1) / 2
   std::ptrdiff_t stride;
   bool on;
 };
 
-SEMBLANCE_WIDE void CombineRows(const RowWay& way, int first, int count, double* across) {
+SEMBLANCE_WIDE void CombineRows(const CoarseRows& way, int first, int count, double* across) {
   const double *const c = way.coarse + first, *const before = c - way.stride,
                       *const after = c + way.stride;
   if (way.on) {
@@ -36,7 +37,8 @@ SEMBLANCE_WIDE void CombineRows(const RowWay& way, int first, int count, double*
   }
 }
 
-// across: from coarse column 0 on; odd fine columns lie on one, even ones between two.
+// across: values from coarse column 0 on. Odd fine columns lie on a coarse column, even ones
+// between two.
 SEMBLANCE_WIDE void RefineAlong(const double* across, int begin, int end, double* fine) {
   const int odd = begin / 2, even = (begin + 1) / 2;  // 2 k + 1, 2 k
   for (int k = odd; 2 * k + 1 < end; ++k) {
@@ -78,20 +80,20 @@ SEMBLANCE_WIDE void SpreadRow(const double* across, int count, bool on, std::ptr
   }
 }
 
-// Where runs of a finer level begin and end, without what the last block has beyond the row.
+// The columns of a run of the finer level, without those of the last block beyond the row.
 struct Columns {
   int begin, end;
   int FirstCoarse() const { return (begin + 1) / 2 - (begin % 2 != 0 ? 1 : 0); }
   int LastCoarse() const { return end / 2 + 1; }
 };
 
-Columns ColumnsOf(const GridRun& run, const GridLayout& layout) {
+Columns RunColumns(const GridRun& run, const GridLayout& layout) {
   return {run.begin, std::min(run.begin + run.size(), layout.grid.Columns())};
 }
 
 }  // namespace
 
-std::array<int, 4> RowsOfPatches(const PatchGrid& grid, int row) {
+std::array<int, 4> PatchRowsAround(const PatchGrid& grid, int row) {
   std::array<int, 4> rows;
   for (int b = 0; b < 4; ++b) {
     rows[b] = PlaceAmong(grid.patches_v, row - 3 + b, false);
@@ -105,7 +107,7 @@ GridRuns RunsAround(const GridLayout& layout, const std::vector<char>& patches) 
   std::vector<char> wanted(columns);
   for (int row = 0; row < layout.grid.Rows(); ++row) {
     std::fill(wanted.begin(), wanted.end(), 0);
-    for (const int j : RowsOfPatches(layout.grid, row)) {
+    for (const int j : PatchRowsAround(layout.grid, row)) {
       if (j < 0) {
         continue;
       }
@@ -198,7 +200,7 @@ void AddRefined(const GridValues& coarser, const GridRuns& runs, GridValues& fin
   std::vector<double> across(coarser.layout().Stride() + 2);
   for (int c = 0; c < coarser.channels(); ++c) {
     for (const GridRun& run : runs) {
-      const Columns columns = ColumnsOf(run, finer.layout());
+      const Columns columns = RunColumns(run, finer.layout());
       const int first = columns.FirstCoarse(), count = columns.LastCoarse() - first + 1;
       CombineRows({.coarse = coarser.Row(c, (run.row + 1) / 2),
                    .stride = static_cast<std::ptrdiff_t>(coarser.layout().Stride()),
@@ -213,7 +215,7 @@ void AddRestricted(const GridValues& finer, const GridRuns& runs, GridValues& co
   std::vector<double> across(coarser.layout().Stride() + 2);
   for (int c = 0; c < coarser.channels(); ++c) {
     for (const GridRun& run : runs) {
-      const Columns columns = ColumnsOf(run, finer.layout());
+      const Columns columns = RunColumns(run, finer.layout());
       const int first = columns.FirstCoarse(), count = columns.LastCoarse() - first + 1;
       std::fill_n(across.begin() + first, count, 0.0);
       RestrictAlong(finer.Row(c, run.row), columns.begin, columns.end, across.data());
@@ -222,6 +224,89 @@ void AddRestricted(const GridValues& finer, const GridRuns& runs, GridValues& co
                 coarser.Row(c, (run.row + 1) / 2) + first);
     }
   }
+}
+
+namespace {
+
+// Calls body(k) for each block of eight places from k on.
+template <class Body>
+SEMBLANCE_INLINE void ForEachBlock(const GridRuns& runs, const Body& body) {
+  for (const GridRun& run : runs) {
+    for (int block = 0; block < run.blocks; ++block) {
+      body(run.at + static_cast<std::size_t>(GridLayout::kBlock) * block);
+    }
+  }
+}
+
+}  // namespace
+
+SEMBLANCE_WIDE double DotOn(const GridRuns& runs, const double* a, const double* b) {
+  Wider sum{};
+  ForEachBlock(
+      runs, [&](std::size_t k)
+                __attribute__((always_inline)) { sum += EightAt(a + k) * EightAt(b + k); });
+  return SumOfEight(sum);
+}
+
+SEMBLANCE_WIDE double SquaresOn(const GridRuns& runs, const double* inverse,
+                                const double* residual) {
+  Wider sum{};
+  ForEachBlock(
+      runs, [&](std::size_t k) __attribute__((always_inline)) {
+        const Wider r = EightAt(residual + k);
+        sum += EightAt(inverse + k) * r * r;
+      });
+  return SumOfEight(sum);
+}
+
+SEMBLANCE_WIDE void CopyOn(const GridRuns& runs, const double* from, double* to) {
+  ForEachBlock(
+      runs, [&](std::size_t k)
+                __attribute__((always_inline)) { PutEight(EightAt(from + k), to + k); });
+}
+
+void InvertOn(const GridRuns& runs, const double* data, const double* energy, double factor,
+              const char* active, double* inverse) {
+  for (const GridRun& run : runs) {
+    for (std::size_t k = run.at; k < run.at + run.size(); ++k) {
+      const double diagonal = data[k] + factor * energy[k];
+      inverse[k] = active[k] != 0 && diagonal > 0 ? 1 / diagonal : 0;
+    }
+  }
+}
+
+SEMBLANCE_WIDE double SubtractOn(const GridRuns& runs, const double* inverse, const double* product,
+                                 double* residual) {
+  Wider sum{};
+  ForEachBlock(
+      runs, [&](std::size_t k) __attribute__((always_inline)) {
+        const Wider r = EightAt(residual + k) - EightAt(product + k);
+        PutEight(r, residual + k);
+        sum += EightAt(inverse + k) * r * r;
+      });
+  return SumOfEight(sum);
+}
+
+SEMBLANCE_WIDE double AdvanceOn(const GridRuns& runs, const GridStep& step, double length) {
+  Wider sum{};
+  ForEachBlock(
+      runs, [&](std::size_t k) __attribute__((always_inline)) {
+        const Wider r = EightAt(step.residual + k) - length * EightAt(step.product + k);
+        PutEight(EightAt(step.solution + k) + length * EightAt(step.direction + k),
+                 step.solution + k);
+        PutEight(r, step.residual + k);
+        sum += EightAt(step.inverse + k) * r * r;
+      });
+  return SumOfEight(sum);
+}
+
+SEMBLANCE_WIDE void TurnOn(const GridRuns& runs, const GridStep& step, double factor) {
+  ForEachBlock(
+      runs, [&](std::size_t k) __attribute__((always_inline)) {
+        PutEight(EightAt(step.inverse + k) * EightAt(step.residual + k) +
+                     factor * EightAt(step.direction + k),
+                 step.direction + k);
+      });
 }
 
 }  // namespace semblance

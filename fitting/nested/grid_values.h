@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Numbers at the control vertices of one level, and their way to the next finer level and back.
+// Values at the control vertices of one level, their refinement to the next finer level and its
+// transpose, and sums over them.
 #pragma once
 
 #include <array>
@@ -12,11 +13,10 @@
 
 namespace semblance {
 
-// How the vertices of a level lie in memory: row by row, each row with kHalo places more at either
-// end. Along periodic u these are copies of the columns across the seam, along open u nothing. Room
-// for a block follows, so that work in blocks may reach beyond a row. Before the first row and
-// behind the last one there are kHalo rows more; along periodic v those behind are copies of the
-// first ones, which is all that is asked for across that seam.
+// The memory layout of a level's vertices: row by row, each row with kHalo additional places at
+// either end. For periodic u these hold copies of the columns across the seam; for open u they are
+// unused. Space for a block follows each row, so that loops over blocks may reach beyond it. kHalo
+// additional rows lie before the first row and after the last one.
 struct GridLayout {
   static constexpr int kHalo = 3, kBlock = 8;
   PatchGrid grid;
@@ -25,7 +25,7 @@ struct GridLayout {
     return static_cast<std::size_t>(grid.Columns()) + std::size_t{2} * kHalo + kBlock;
   }
   std::size_t Size() const { return Stride() * static_cast<std::size_t>(grid.Rows()); }
-  // i: -kHalo .. Columns() + kHalo - 1; j: likewise of rows.
+  // i: -kHalo .. Columns() + kHalo - 1; j: -kHalo .. Rows() + kHalo - 1.
   std::size_t At(int i, int j) const {
     return static_cast<std::size_t>(j) * Stride() + static_cast<std::size_t>(i + kHalo);
   }
@@ -40,24 +40,25 @@ struct GridLayout {
   }
 };
 
-// Vertices of one row that stand side by side, in whole blocks: the last may reach beyond those
-// that are wanted, and beyond the row.
+// Adjacent vertices of one row, in whole blocks. The last block may reach beyond the wanted
+// vertices, and beyond the row.
 struct GridRun {
-  std::size_t at = 0;  // of the first, GridLayout::At
+  std::size_t at = 0;  // GridLayout::At of the first vertex
   int row = 0, begin = 0, blocks = 0;
   int size() const { return GridLayout::kBlock * blocks; }
 };
-// Row by row, and by column; no two share a place.
+// Runs sorted by row, then column. No two runs overlap.
 using GridRuns = std::vector<GridRun>;
 
-// The rows of patches that a row of vertices belongs to; -1 where one would lie beyond a border.
-std::array<int, 4> RowsOfPatches(const PatchGrid& grid, int row);
+// The rows of patches that contain a row of vertices; -1 for a row beyond a border.
+std::array<int, 4> PatchRowsAround(const PatchGrid& grid, int row);
 
-// Those that hold the sixteen vertices of every patch that is not 0 (GridLayout::Patch).
+// The runs that contain the sixteen vertices of every patch with a non-zero flag
+// (GridLayout::Patch).
 GridRuns RunsAround(const GridLayout& layout, const std::vector<char>& patches);
 
-// Several numbers per vertex, each kind (a channel) apart from the others. Memory that nothing was
-// written to costs nothing, so that a fine level with few vertices stays small.
+// Several values per vertex, stored channel by channel. Memory comes from calloc, and pages that
+// nothing is written to take no memory, so a fine level with few vertices stays small.
 class GridValues {
  public:
   GridValues() = default;
@@ -67,14 +68,14 @@ class GridValues {
   int channels() const { return channels_; }
   double* Channel(int c) { return values_.get() + Start(c); }  // by GridLayout::At
   const double* Channel(int c) const { return values_.get() + Start(c); }
-  double* Row(int c, int j) { return Channel(c) + layout_.At(0, j); }  // of column 0
+  double* Row(int c, int j) { return Channel(c) + layout_.At(0, j); }  // at column 0
   const double* Row(int c, int j) const { return Channel(c) + layout_.At(0, j); }
 
   void Clear(const GridRuns& runs);
   // Copies the columns across the seam into the halo of the runs' rows.
   void FillHalo(const GridRuns& runs);
-  // Adds what the halo has gathered to the vertices that it stands for, and empties it; also of the
-  // three rows beneath each run.
+  // Adds the halo's values to the vertices that it mirrors, and clears it, in the runs' rows and
+  // the three rows after each.
   void FoldHalo(const GridRuns& runs);
 
  private:
@@ -93,10 +94,41 @@ class GridValues {
   std::unique_ptr<double[], Free> values_;
 };
 
-// On the finer level's runs: finer += P coarser, P being the insertion of a knot in the middle of
-// each patch. The halo of `coarser` must be filled.
+// finer += P coarser on the finer level's runs, where P inserts a knot in the middle of each patch.
+// The halo of `coarser` must be filled.
 void AddRefined(const GridValues& coarser, const GridRuns& runs, GridValues& finer);
-// From the finer level's runs: coarser += P^T finer. The halo of `coarser` gathers too.
+// coarser += P^T finer from the finer level's runs. Contributions across the seam go to the halo of
+// `coarser` (FoldHalo).
 void AddRestricted(const GridValues& finer, const GridRuns& runs, GridValues& coarser);
+
+// The following sums and updates work on the runs alone, eight values at a time. Pointers refer to
+// places by GridLayout::At. The eight partial sums are added in a fixed order, so that every
+// processor gives the same bits.
+
+double DotOn(const GridRuns& runs, const double* a, const double* b);
+// The sum of inverse * residual^2.
+double SquaresOn(const GridRuns& runs, const double* inverse, const double* residual);
+// to = from.
+void CopyOn(const GridRuns& runs, const double* from, double* to);
+// inverse = 1 / (data + factor * energy) where `active`, else 0.
+void InvertOn(const GridRuns& runs, const double* data, const double* energy, double factor,
+              const char* active, double* inverse);
+// residual -= product. Returns SquaresOn of the new residual.
+double SubtractOn(const GridRuns& runs, const double* inverse, const double* product,
+                  double* residual);
+
+// The vectors of a step of conjugate gradients, for one channel of one level.
+struct GridStep {
+  const double* inverse;  // of the diagonal: the preconditioner
+  const double* product;  // matrix times direction
+  double* direction;
+  double* residual;
+  double* solution;
+};
+// solution += length * direction, residual -= length * product. Returns the sum of inverse *
+// residual^2.
+double AdvanceOn(const GridRuns& runs, const GridStep& step, double length);
+// direction = inverse * residual + factor * direction.
+void TurnOn(const GridRuns& runs, const GridStep& step, double factor);
 
 }  // namespace semblance

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the loops over points share: eight numbers in one register, and a point's weights.
+// Helpers of the vectorised loops: eight numbers in one register, and the B-spline weights of a
+// point.
 #pragma once
 
 #include <cstring>
@@ -8,7 +9,7 @@
 
 namespace semblance {
 
-// It is always inlined: no call depends on how the vector would be returned.
+// The function is always inlined, so the warning about returning a vector does not apply.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wpsabi"
 SEMBLANCE_INLINE Wider EightAt(const double* from) {
@@ -19,13 +20,13 @@ SEMBLANCE_INLINE Wider EightAt(const double* from) {
 #pragma GCC diagnostic pop
 SEMBLANCE_INLINE void PutEight(const Wider& n, double* to) { std::memcpy(to, &n, sizeof n); }
 
-// In one order, so that every processor gives the same bits.
+// Sums in a fixed order, so that every processor gives the same bits.
 SEMBLANCE_INLINE double SumOfEight(const Wider& n) {
   return ((n[0] + n[4]) + (n[2] + n[6])) + ((n[1] + n[5]) + (n[3] + n[7]));
 }
 
-// CubicWeights, to the bit, in the instructions of whichever clone calls it: each of the four is a
-// cubic of t or 1 - t, so that one division serves them all.
+// Computes CubicWeights bit by bit, in the instruction set of the calling clone. Each of the four
+// weights is a cubic of t or 1 - t, so one division serves all.
 SEMBLANCE_INLINE void WeightsAt(double t, double* weights) {
   constexpr Wide kOnes = {0, 4, 4, 0}, kSquares = {0, 6, 6, 0}, kCubes = {1, 3, 3, 1};
   const double s = 1 - t;

@@ -10,13 +10,14 @@
 namespace semblance {
 namespace {
 
-// The products of two of four weights, each pair once; the rest are zeros, to fill registers.
+// The products of two of four weights, each pair once. The remaining places are zero and fill the
+// registers.
 constexpr int kPairs = 10, kRoom = 12;
 constexpr std::array<std::array<int, 4>, 4> kPair = {
     {{0, 1, 2, 3}, {1, 4, 5, 6}, {2, 5, 7, 8}, {3, 6, 8, 9}}};
 using Pairs = double[kPairs][kRoom];
 
-Matrix16 GramOf(const Pairs& sums) {
+Matrix16 MakeGram(const Pairs& sums) {
   Matrix16 gram;
   for (int k = 0; k < 16; ++k) {
     for (int l = 0; l < 16; ++l) {
@@ -26,16 +27,16 @@ Matrix16 GramOf(const Pairs& sums) {
   return gram;
 }
 
-// A leaf's points, and where in it they are.
-struct PointsOfLeaf {
+// A leaf's points, and the map from their places to the leaf.
+struct LeafPoints {
   const NestedPoints& points;
   const std::uint32_t* indices;
   std::size_t count;
   double scale, first_u, first_v;
 };
 
-PointsOfLeaf Of(const NestedPoints& points, const LeafPatch& leaf,
-                std::span<const std::uint32_t> indices) {
+LeafPoints MakeLeafPoints(const NestedPoints& points, const LeafPatch& leaf,
+                          std::span<const std::uint32_t> indices) {
   return {.points = points,
           .indices = indices.data(),
           .count = indices.size(),
@@ -44,7 +45,7 @@ PointsOfLeaf Of(const NestedPoints& points, const LeafPatch& leaf,
           .first_v = static_cast<double>(leaf.j)};
 }
 
-SEMBLANCE_INLINE void PairsOf(const double* weights, double factor, double* pairs) {
+SEMBLANCE_INLINE void MakePairs(const double* weights, double factor, double* pairs) {
   int at = 0;
   for (int a = 0; a < 4; ++a) {
     for (int b = a; b < 4; ++b) {
@@ -53,27 +54,27 @@ SEMBLANCE_INLINE void PairsOf(const double* weights, double factor, double* pair
   }
 }
 
-// Some points of a leaf, so few that a core keeps all of it at hand.
+// A block of points of a leaf, small enough for the first-level cache.
 template <int channels>
 struct Block {
-  static constexpr int kMost = 32;  // points
+  static constexpr int kCapacity = 32;  // points
   int count = 0;
-  alignas(64) double pairs_u[kMost][kRoom] = {};
-  alignas(64) double pairs_v[kMost][kPairs];  // times the point's weight
-  alignas(64) double both[kMost][16];
-  alignas(64) double values[kMost][channels + 1];  // the probe last
+  alignas(64) double pairs_u[kCapacity][kRoom] = {};
+  alignas(64) double pairs_v[kCapacity][kPairs];  // times the point's weight
+  alignas(64) double both[kCapacity][16];
+  alignas(64) double values[kCapacity][channels + 1];  // the probe last
 };
 
 template <int channels>
-SEMBLANCE_INLINE void Put(const PointsOfLeaf& leaf, std::uint32_t k, Block<channels>& block,
+SEMBLANCE_INLINE void Put(const LeafPoints& leaf, std::uint32_t k, Block<channels>& block,
                           LeafSums& all) {
   const int n = block.count++;
   double u[4], v[4];
   const double w = leaf.points.Weight(k);
   WeightsAt(leaf.points.X(k) * leaf.scale - leaf.first_u, u);
   WeightsAt(leaf.points.Y(k) * leaf.scale - leaf.first_v, v);
-  PairsOf(u, 1, block.pairs_u[n]);
-  PairsOf(v, w, block.pairs_v[n]);
+  MakePairs(u, 1, block.pairs_u[n]);
+  MakePairs(v, w, block.pairs_v[n]);
   for (int m = 0; m < 16; ++m) {
     block.both[n][m] = u[m % 4] * v[m / 4];
   }
@@ -85,8 +86,9 @@ SEMBLANCE_INLINE void Put(const PointsOfLeaf& leaf, std::uint32_t k, Block<chann
   all.weight += w;
 }
 
-// Adds factors[n][r] times the four numbers of across[n] from `first` on to those of row r of the
-// sums. The rows stay in registers while the points pass, and each takes them in their order.
+// Adds factors[n][r] times the four numbers of across[n] from `first` on to row r of the sums. The
+// rows stay in registers during the loop over the points, and each row adds the points in their
+// order.
 template <int rows, int room>
 SEMBLANCE_INLINE void AddProducts(const double (*factors)[rows], const double (*across)[room],
                                   int first, int count, double (*sums)[room]) {
@@ -117,12 +119,12 @@ SEMBLANCE_INLINE void AddBlock(const Block<channels>& block, Pairs& sums, double
 }
 
 template <int channels>
-SEMBLANCE_INLINE void AddPoints(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
+SEMBLANCE_INLINE void AddPoints(const LeafPoints& leaf, Pairs& sums, LeafSums& all) {
   Block<channels> block;
   alignas(64) double right[channels + 1][16] = {};
   for (std::size_t n = 0; n < leaf.count; ++n) {
     Put<channels>(leaf, leaf.indices[n], block, all);
-    if (block.count == Block<channels>::kMost || n + 1 == leaf.count) {
+    if (block.count == Block<channels>::kCapacity || n + 1 == leaf.count) {
       AddBlock<channels>(block, sums, right);
       block.count = 0;
     }
@@ -130,19 +132,19 @@ SEMBLANCE_INLINE void AddPoints(const PointsOfLeaf& leaf, Pairs& sums, LeafSums&
   std::memcpy(all.right.data(), right, sizeof right);
 }
 
-SEMBLANCE_WIDE void AddPointsOf1(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
+SEMBLANCE_WIDE void AddPointsOf1(const LeafPoints& leaf, Pairs& sums, LeafSums& all) {
   AddPoints<1>(leaf, sums, all);
 }
-SEMBLANCE_WIDE void AddPointsOf2(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
+SEMBLANCE_WIDE void AddPointsOf2(const LeafPoints& leaf, Pairs& sums, LeafSums& all) {
   AddPoints<2>(leaf, sums, all);
 }
-SEMBLANCE_WIDE void AddPointsOf3(const PointsOfLeaf& leaf, Pairs& sums, LeafSums& all) {
+SEMBLANCE_WIDE void AddPointsOf3(const LeafPoints& leaf, Pairs& sums, LeafSums& all) {
   AddPoints<3>(leaf, sums, all);
 }
 
 template <int channels>
-SEMBLANCE_INLINE void Leave(const PointsOfLeaf& leaf, const LeafVertices& vertices,
-                            NestedResidual* residuals) {
+SEMBLANCE_INLINE void ComputeResiduals(const LeafPoints& leaf, const LeafVertices& vertices,
+                                       NestedResidual* residuals) {
   Wide rows[channels][4];
   std::memcpy(rows, vertices.data(), sizeof rows);
   double u[4], v[4];
@@ -162,17 +164,17 @@ SEMBLANCE_INLINE void Leave(const PointsOfLeaf& leaf, const LeafVertices& vertic
   }
 }
 
-SEMBLANCE_WIDE void LeaveOf1(const PointsOfLeaf& leaf, const LeafVertices& vertices,
-                             NestedResidual* residuals) {
-  Leave<1>(leaf, vertices, residuals);
+SEMBLANCE_WIDE void ComputeResidualsOf1(const LeafPoints& leaf, const LeafVertices& vertices,
+                                        NestedResidual* residuals) {
+  ComputeResiduals<1>(leaf, vertices, residuals);
 }
-SEMBLANCE_WIDE void LeaveOf2(const PointsOfLeaf& leaf, const LeafVertices& vertices,
-                             NestedResidual* residuals) {
-  Leave<2>(leaf, vertices, residuals);
+SEMBLANCE_WIDE void ComputeResidualsOf2(const LeafPoints& leaf, const LeafVertices& vertices,
+                                        NestedResidual* residuals) {
+  ComputeResiduals<2>(leaf, vertices, residuals);
 }
-SEMBLANCE_WIDE void LeaveOf3(const PointsOfLeaf& leaf, const LeafVertices& vertices,
-                             NestedResidual* residuals) {
-  Leave<3>(leaf, vertices, residuals);
+SEMBLANCE_WIDE void ComputeResidualsOf3(const LeafPoints& leaf, const LeafVertices& vertices,
+                                        NestedResidual* residuals) {
+  ComputeResiduals<3>(leaf, vertices, residuals);
 }
 
 }  // namespace
@@ -185,20 +187,20 @@ double ProbeSign(std::uint32_t k) {
 
 LeafSums SumsOver(const NestedPoints& points, const LeafPatch& leaf,
                   std::span<const std::uint32_t> indices) {
-  constexpr void (*kAdd[])(const PointsOfLeaf&, Pairs&, LeafSums&) = {AddPointsOf1, AddPointsOf2,
-                                                                      AddPointsOf3};
+  constexpr void (*kAdd[])(const LeafPoints&, Pairs&, LeafSums&) = {AddPointsOf1, AddPointsOf2,
+                                                                    AddPointsOf3};
   alignas(64) Pairs pairs = {};
   LeafSums sums;
-  kAdd[points.channels - 1](Of(points, leaf, indices), pairs, sums);
-  sums.gram = GramOf(pairs);
+  kAdd[points.channels - 1](MakeLeafPoints(points, leaf, indices), pairs, sums);
+  sums.gram = MakeGram(pairs);
   return sums;
 }
 
 void ResidualsOver(const NestedPoints& points, const LeafPatch& leaf, const LeafVertices& vertices,
                    std::span<const std::uint32_t> indices, NestedResidual* residuals) {
-  constexpr void (*kLeave[])(const PointsOfLeaf&, const LeafVertices&, NestedResidual*) = {
-      LeaveOf1, LeaveOf2, LeaveOf3};
-  kLeave[points.channels - 1](Of(points, leaf, indices), vertices, residuals);
+  constexpr void (*kCompute[])(const LeafPoints&, const LeafVertices&, NestedResidual*) = {
+      ComputeResidualsOf1, ComputeResidualsOf2, ComputeResidualsOf3};
+  kCompute[points.channels - 1](MakeLeafPoints(points, leaf, indices), vertices, residuals);
 }
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Noise from the points alone, and what is left of it between neighbours.
+// Estimates of the noise from the points alone, and the correlation of neighbours' residuals.
 #pragma once
 
 #include <cstdint>
@@ -11,20 +11,21 @@ namespace semblance {
 
 enum class NeighbourModel { kPlaneOf8, kQuadraticOf20 };
 
-// Standard deviation of a point of mean weight along one axis: a plane or quadratic through each of
-// some thousand points and its neighbours in (u,v), by least squares, and the median of what that
-// leaves per degree of freedom. Detail that neighbours do not share is in it, the more of it the
-// wider the neighbourhood. NaN for too few points.
+// The standard deviation of a point of mean weight along one axis. It fits a plane or quadratic by
+// least squares to each of about a thousand points and its neighbours in (u,v), and takes the
+// median of the squared residuals per degree of freedom. Detail that the plane or quadratic cannot
+// follow counts as noise, and more so in wider neighbourhoods. Returns NaN for too few points.
 double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
                       NeighbourModel model);
 
-// Of pairs of residuals, each times its point's Scale: the sum of e_a . e_b over that of |e|^2. 0
-// for errors that do not know of each other.
+// The correlation of pairs of residuals: the sum of e_a . e_b divided by that of (|e_a|^2 +
+// |e_b|^2) / 2, where each residual is multiplied by its point's Scale. Its expectation is 0 for
+// independent errors.
 class PairCorrelation {
  public:
   void Add(const NestedResidual& a, const NestedResidual& b);
   double Value() const { return squares_ > 0 ? together_ / squares_ : 0; }
-  // The standard error is 1 / sqrt(Count()), or less.
+  // The number of pairs. The standard error of Value() is at most 1 / sqrt(Count()).
   std::size_t Count() const { return count_; }
 
  private:
@@ -32,8 +33,7 @@ class PairCorrelation {
   std::size_t count_ = 0;
 };
 
-// Of that tenth of the pairs of neighbours along the curve whose points are closest to each other
-// in (u,v).
+// The correlation over the closest tenth, in (u,v), of the pairs of neighbours along the curve.
 PairCorrelation ClosestCorrelation(const NestedPoints& points,
                                    std::span<const std::uint32_t> indices,
                                    std::span<const NestedResidual> residuals);

@@ -1,4 +1,43 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// States of a nested fit (class NestedFitter).
+//
+//   start
+//     |  ChooseSample, FindGrossOutliers
+//     v
+//   SAMPLED <---------------------- ChooseSample <-----------------+
+//     |  FitRound: weight and metric by cross-validation            |
+//     v                                                             |
+//   FITTED                                                          |
+//     |  Judge: held-out error, outliers, best round                |
+//     v                                                             |
+//   JUDGED ---- Refine: finer vertices were added ------------------+
+//     |  none were added, or IsMet, or kMaxRounds
+//     v
+//   RESTORED: the best round's space, solution, weight and metric; every point
+//     |  DropOutliers, FitAll, DropOutliers (if they changed: FitAll)
+//     |  ReinstateSteps (if any: FitAll with the same weight)
+//     v
+//   DONE: report, surface, distances
+//
+//   transition    requires                            guarantees
+//   FitRound      SAMPLED, a linked space_            solve_ holds the best solution of the round
+//   Judge         FITTED                              residuals_, held-out error and outlier_ are
+//                                                     those of this solution; best_ is up to date
+//   Refine        JUDGED                              space_ is linked; true: it has new vertices
+//   FitAll        RESTORED, outlier_ up to date       solve_ holds the solution for all inliers
+//
+// Invariants, which functions refer to by number.
+//   1. solve_ refers to points_ and space_. After a change of space_ it must Begin or Enter again.
+//   2. In JUDGED residuals_[n] is the residual of point n * every_ of the curve.
+//   3. points_.mean_weight is the mean weight of the points with outlier_ 0.
+//   4. A point is held out by its place along the curve (IsHeld). A round never fits held-out
+//      points or outliers; FitAll fits all inliers.
+//   5. best_ is the last round whose held-out mean square is more than 0.1 % below that of the
+//      best round before it. So of equally good rounds the coarsest is chosen.
+//   6. weight_, metric_ and least_gain_ are the results of the last search, and the start of the
+//      next one.
+//   7. every_ does not grow from round to round, because the number of vertices does not fall.
+//   8. All sums are in the order of the curve, so the given order of the points has no effect.
 #include "fitting/nested/nested_fit.h"
 
 #include <fmt/format.h>
@@ -12,7 +51,6 @@
 #include <utility>
 
 #include "fitting/nested/neighbour_noise.h"
-#include "fitting/nested/nested_steps.h"
 #include "fitting/nested/outlier_search.h"
 #include "fitting/nested/unresolved_detail.h"
 #include "fitting/nested/weight_search.h"
@@ -25,41 +63,52 @@ namespace {
 using Residual = NestedResidual;
 using Indices = std::vector<std::uint32_t>;
 
-constexpr int kMostRounds = 24;
-constexpr std::size_t kFewestLooked = 100000, kPointsPerVertex = 24;
-constexpr double kAsGood = 1.001;            // of the mean square held out
-constexpr double kFewNew = 0.007;            // of the vertices: not worth a round
-constexpr double kFewMore = 0.02;            // the same after a round that gained nothing
-constexpr double kDense = 1.25;              // points for a patch of the next level
-constexpr double kCheapDense = 0.3;          // the same where all patches together are few
-constexpr std::size_t kCheap = 50000;        // points
-constexpr int kQuick = 10000;                // vertices: solves take no time to speak of
-constexpr double kSure = 1;                  // standard errors of a correlation
-constexpr std::size_t kPatchesPerPoint = 4;  // of a level: more take time
-// Of the extent. What is left below it is rounding: the mean square is a difference of sums.
+// The constants were chosen on the point sets of docs/fit.md, "How good it is" (`fit_bench
+// untuned`), unless a line states another reason.
+
+constexpr int kMaxRounds = 24;  // bounds the loop, which normally ends by Refine
+// The smallest sample, and its points per vertex. Smaller samples save time in the first rounds;
+// larger ones find detail earlier.
+constexpr std::size_t kMinSample = 100000, kPointsPerVertex = 24;
+// Improvement of the held-out mean square that a finer round needs; closer rounds count as equal.
+constexpr double kBetterRatio = 1.001;
+// Smallest share of new vertices that is worth a round, and the same after a round that gained
+// nothing. Smaller shares cost rounds, larger ones lose detail.
+constexpr double kMinNewShare = 0.007, kMinNewShareAfterNoGain = 0.02;
+// Points per patch of the next level for overlaying all dense patches; with fewer, vertices have
+// too few points. Cheap fits may go further, since cross-validation smooths what is too fine.
+constexpr double kDense = 1.25, kCheapDense = 0.3;
+constexpr std::size_t kCheapPoints = 50000;  // below, a fit takes well under a second
+constexpr int kQuickVertices = 10000;        // below, exact solves take little time
+constexpr double kMinStandardErrors = 1;     // of a correlation that shows detail; more stop early
+constexpr std::size_t kPatchesPerPoint = 4;  // of a tested level; more take time and memory
+// Ratio of neighbouring weights in the search, in rounds and in the final fit: solves against a
+// closer weight. The score is flat near its minimum.
+constexpr double kCoarseFactor = 4, kFineFactor = 2;
+// Held-out error, relative to the extent, that is round-off: mean squares are differences of sums.
 constexpr double kRounding = 1e-8;
 
 [[noreturn]] void Fail(const std::string& what) { throw InputError("fit: plan auto: " + what); }
 
-constexpr std::size_t kFewestPoints = 16;
+constexpr std::size_t kMinPoints = 16;  // so that a tenth of them is at least one point
 [[noreturn]] void FailForFew(std::size_t count, const char* of_kind) {
   Fail(
-      fmt::format("{} points{} are too few to leave some out; give at least {}, or take another "
+      fmt::format("{} points{} are too few to hold some out; give at least {}, or choose another "
                   "plan",
-                  count, of_kind, kFewestPoints));
+                  count, of_kind, kMinPoints));
 }
 
-// One in ten, by its place along the curve.
+// Returns whether a point is held out: one in ten, pseudo-randomly by its place along the curve.
 bool IsHeld(std::uint32_t k) {
   const std::uint64_t bits = (k + 1) * 0xD1B54A32D192ED03u;
   return (bits ^ bits >> 31) % 10 == 0;
 }
 
-// The finest level on which a patch with points has more than one of them on the mean.
+// The finest level on which patches with points have more than kPointsPerPatch of them on average.
 int FinestByDensity(const NestedPoints& points, std::size_t every, const GridLayout& level0,
                     int finest) {
-  constexpr double kPointsPerPatch = 1.3;
-  constexpr std::size_t kFewPatches = 1 << 20;
+  constexpr double kPointsPerPatch = 1.3;       // fewer determine nothing
+  constexpr std::size_t kFewPatches = 1 << 20;  // affordable for any number of points
   const std::size_t count = (points.size() + every - 1) / every;
   GridLayout layout = level0;
   for (int level = 1; level <= finest; ++level) {
@@ -79,15 +128,69 @@ int FinestByDensity(const NestedPoints& points, std::size_t every, const GridLay
   return finest;
 }
 
+// The state of a round that predicts the held-out points best.
 struct Snapshot {
   NestedSpace space;
   NestedSolve::Packed solution;
   double weight = kNaN;
-  double known = kNaN;  // weight for all points, where a search by as good as all has found it
+  double known = kNaN;  // weight for the final fit; NaN: search again, as it is quick or sampled
   BendingMetric metric;
   double held_square = kNaN;
   int round = -1;
 };
+
+// A displacement along the channels as a vector in space.
+Vec3 InSpace(const NestedPoints& points, const GridValues& values, int i, int j) {
+  Vec3 sum = Vec3::Zero();
+  for (int c = 0; c < points.channels; ++c) {
+    sum += values.Row(c, j)[i] * points.axes.col(c);
+  }
+  return sum;
+}
+
+// The offsets of a level's vertices from the next coarser surface, in its frame or the world's.
+std::map<VertexId, std::optional<Vec3>> MakeOffsets(const NestedSpace& space, int level,
+                                                    const NestedPoints& points,
+                                                    const ControlNet& rest,
+                                                    const GridValues& displacements,
+                                                    const HSplineSurface& surface) {
+  std::map<VertexId, std::optional<Vec3>> offsets;
+  const NestedLevel& nested = space[level];
+  const bool world = surface.shape().reference == OffsetReference::kWorld;
+  for (int i = 0; i < rest.columns; ++i) {
+    for (int j = 0; j < rest.rows; ++j) {
+      if (nested.active[nested.layout.At(i, j)] == 0 || space.IsCovered(level, i, j)) {
+        continue;
+      }
+      const VertexId vertex{level, i, j};
+      const SurfaceFrame frame = surface.LevelFrame(level - 1, surface.ParameterOf(vertex));
+      const Vec3 way = rest.At(i, j) + InSpace(points, displacements, i, j) - frame.point;
+      offsets.emplace_hint(offsets.end(), vertex, world ? way : Vec3(frame.axes.transpose() * way));
+    }
+  }
+  return offsets;
+}
+
+// The start plus the displacements as an H-spline, level by level, because an offset is measured
+// from the next coarser surface.
+HSplineSurface MakeSurface(const HSplineSurface& start, const NestedSpace& space,
+                           const NestedPoints& points, const NestedValues& displacements) {
+  HSplineShape shape = start.shape();
+  shape.max_level = space.finest();
+  ControlNet net = start.Net(0);
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      net.At(i, j) += InSpace(points, displacements[0], i, j);
+    }
+  }
+  HSplineSurface surface(shape, net);
+  ControlNet rest = start.Net(0);
+  for (int level = 1; level <= space.finest(); ++level) {
+    rest = Refine(shape, rest, level - 1);
+    surface.SetOffsets(MakeOffsets(space, level, points, rest, displacements[level], surface));
+  }
+  return surface;
+}
 
 class NestedFitter {
  public:
@@ -106,9 +209,9 @@ class NestedFitter {
   }
 
   NestedFitResult Run() {
-    Look();
-    BeforeAnyFit();
-    for (int round = 0; round < kMostRounds; ++round) {
+    ChooseSample();
+    FindGrossOutliers();
+    for (int round = 0; round < kMaxRounds; ++round) {
       context_.ThrowIfStopped();
       context_.Report("fit",
                       fmt::format("{} vertices to level {}", space_.Vertices(), space_.finest()));
@@ -121,34 +224,37 @@ class NestedFitter {
   }
 
  private:
-  // Some of the points, as many as the vertices need.
-  void Look() {
+  // Chooses every_, so that the sample has as many points as the vertices need.
+  void ChooseSample() {
     const std::size_t enough =
-        std::max(kFewestLooked, kPointsPerVertex * static_cast<std::size_t>(space_.Vertices()));
+        std::max(kMinSample, kPointsPerVertex * static_cast<std::size_t>(space_.Vertices()));
     const std::size_t every = std::max<std::size_t>(points_.size() / enough, 1);
     if (every == every_) {
       return;
     }
     every_ = every;
-    finest_seen_ = FinestByDensity(points_, every_, space_[0].layout, finest_);
+    sample_finest_ = FinestByDensity(points_, every_, space_[0].layout, finest_);
   }
 
-  bool IsCheap() const { return points_.size() < kCheap; }
-  bool IsQuick() const { return space_.Vertices() < kQuick; }
-  // What a solve leaves of its gain; where it takes long, as much as the search can do with.
+  bool IsCheap() const { return points_.size() < kCheapPoints; }
+  bool IsQuick() const { return space_.Vertices() < kQuickVertices; }
+  // The part of the noise's effect at which a solve ends (NestedWeightSearch). Slow solves end
+  // earlier, as soon as the comparison of weights allows.
   double PartLeft() const { return IsQuick() ? 0.01 : 0.1; }
 
+  // Calls visit(n, k) for the n-th sampled point, point k of the curve.
   template <class Visit>
-  void ForEachLooked(const Visit& visit) const {
+  void ForEachSampled(const Visit& visit) const {
     for (std::size_t k = 0, n = 0; k < points_.size(); k += every_, ++n) {
       visit(n, static_cast<std::uint32_t>(k));
     }
   }
 
-  Indices Kept() const {
+  // The sampled inliers.
+  Indices SampledInliers() const {
     Indices indices;
     indices.reserve(points_.size() / every_ + 1);
-    ForEachLooked([&](std::size_t, std::uint32_t k) {
+    ForEachSampled([&](std::size_t, std::uint32_t k) {
       if (outlier_[k] == 0) {
         indices.push_back(k);
       }
@@ -156,61 +262,61 @@ class NestedFitter {
     return indices;
   }
 
-  // One point in `every_`, but for outliers and those held out.
-  PointChoice Fitted() const {
+  // The points of a round: the sample without outliers and held-out points (invariant 4).
+  PointChoice RoundPoints() const {
     PointChoice choice{.every = every_, .left_out = outlier_};
-    ForEachLooked([&](std::size_t, std::uint32_t k) { choice.left_out[k] |= IsHeld(k) ? 1 : 0; });
+    ForEachSampled([&](std::size_t, std::uint32_t k) { choice.left_out[k] |= IsHeld(k) ? 1 : 0; });
     return choice;
   }
 
-  // Of those that are looked at.
-  ResidualsBetween Residuals() const {
+  ResidualsBetween SampledResiduals() const {
     return [this](std::size_t begin, std::size_t end) {
       return std::span(residuals_).subspan(begin, end - begin);
     };
   }
 
-  // The displacements themselves tell the grossest outliers, which would bend the first surface.
-  void BeforeAnyFit() {
+  // Finds gross outliers from the displacements alone, because they would bend the first surface.
+  void FindGrossOutliers() {
     if (plan_.outliers == OutlierRule::kKeep) {
       return;
     }
     residuals_.clear();
-    ForEachLooked([&](std::size_t, std::uint32_t k) {
+    ForEachSampled([&](std::size_t, std::uint32_t k) {
       const Vec3& value = points_.value[k];
       residuals_.push_back({{value[0], value[1], value[2]}});
     });
-    Find(Residuals(), /*noise_mm=*/0);
+    UpdateOutliers(SampledResiduals(), /*noise_mm=*/0);
   }
 
-  LeastSpread Least(double noise_mm) const {
-    constexpr double kAtBorders = 10;  // rounding lets the smoothness show, more so there
+  LeastSpread MinSpread(double noise_mm) const {
+    constexpr double kAtBorders = 10;  // smoothness exceeds round-off most at borders
     return {.noise_mm = noise_mm, .rounding_mm = kAtBorders * rounding_mm_};
   }
 
-  // Returns how many there are. What is told of points is told of those of mean weight among the
-  // others.
-  int Find(const ResidualsBetween& residuals, double noise_mm) {
-    // Gross errors bend the first surface so that some of them are not far from it.
-    const OutlierTail tail = report_.rounds.empty() ? OutlierTail::kGoes : OutlierTail::kStays;
-    const int count = FindOutliers(points_, every_, residuals, Least(noise_mm), tail, outlier_);
-    points_.TakeMeanWeight(outlier_);
+  // Updates outlier_ of the sampled points, and the mean weight (invariant 3). Returns the number
+  // of sampled outliers.
+  int UpdateOutliers(const ResidualsBetween& residuals, double noise_mm) {
+    // Gross errors bend the first surface, so some of them are not far from it.
+    const OutlierTail tail = report_.rounds.empty() ? OutlierTail::kReject : OutlierTail::kKeep;
+    const int count = FindOutliers(points_, every_, residuals, MinSpread(noise_mm), tail, outlier_);
+    points_.UpdateMeanWeight(outlier_);
     return count;
   }
 
   void FitRound() {
-    Look();
-    PointChoice fitted = Fitted();
+    const bool scan = NeedsStretchScan();  // uses residuals_, so before every_ changes
+    ChooseSample();
+    PointChoice fitted = RoundPoints();
     const std::size_t count = fitted.Count(points_);
     solve_.Begin(space_, std::move(fitted), metric_);
     NestedWeightSearch search(count, solve_, PartLeft(), least_gain_);
     if (std::isnan(weight_)) {
       search.Scan();
-      search.Climb(4, search.Finish().weight);
+      search.Climb(kCoarseFactor, search.Finish().weight);
     } else {
-      search.ClimbAnew(4, weight_);
+      search.ClimbFromRough(kCoarseFactor, weight_);
     }
-    SearchLengths(search);
+    SearchMetric(search, scan);
     const NestedWeight chosen = search.Finish();
     between_ = search.Between();
     least_gain_ = search.least_gain();
@@ -222,34 +328,41 @@ class NestedFitter {
     Judge(chosen, search.steps());
   }
 
-  // The lengths in which the surface bends.
-  void SearchLengths(NestedWeightSearch& search) {
+  // Returns whether to try stretched metrics although the surface shows no direction yet: its
+  // vertices are as dense as the points and have found nothing. Once per level.
+  bool NeedsStretchScan() const {
+    return plan_.stretched && space_.finest() >= finest_ && space_.finest() > finest_scanned_ &&
+           HasFoundNothing();
+  }
+
+  void SearchMetric(NestedWeightSearch& search, bool scan) {
     if (!plan_.stretched) {
       return;
     }
-    if (space_.finest() >= finest_ && space_.finest() > finest_scanned_ && HasFoundNothing()) {
-      search.ScanStretches(4);
+    if (scan) {
+      search.ScanStretches(kCoarseFactor);
       finest_scanned_ = space_.finest();
     }
-    search.Stretch(4);
+    search.Stretch(kCoarseFactor);
   }
 
-  // Vertices as dense as the points have not brought the surface nearer to those held out, yet
-  // the closest points agree.
+  // Returns whether the refinement has not brought the surface nearer to the held-out points,
+  // although the closest points agree.
   bool HasFoundNothing() const {
-    constexpr double kNothing = 0.7;
+    constexpr double kNoGainRatio = 0.7;  // remaining share of the first round's held-out error
     const std::vector<NestedRound>& rounds = report_.rounds;
     return !rounds.empty() &&
-           rounds.back().held_out_rms_mm > kNothing * rounds.front().held_out_rms_mm &&
+           rounds.back().held_out_rms_mm > kNoGainRatio * rounds.front().held_out_rms_mm &&
            ClosestAgree();
   }
 
-  // By the points held out.
+  // Sets residuals_, finds outliers, and compares the round with the best one by the held-out
+  // points.
   void Judge(const NestedWeight& chosen, int steps) {
-    residuals_ = solve_.ResidualsOf({.every = every_});
+    residuals_ = solve_.Residuals({.every = every_});
     std::vector<double> squares;
     double weights = 0;
-    ForEachLooked([&](std::size_t n, std::uint32_t k) {
+    ForEachSampled([&](std::size_t n, std::uint32_t k) {
       if (IsHeld(k) && outlier_[k] == 0) {
         squares.push_back(Scaled(residuals_[n], k).Square());
         weights += points_.Scale(k) * points_.Scale(k);
@@ -259,19 +372,19 @@ class NestedFitter {
                                         : std::accumulate(squares.begin(), squares.end(), 0.0) /
                                               weights / points_.channels;
     if (plan_.outliers == OutlierRule::kDrop) {
-      outliers_ = Find(Residuals(), HeldSd(std::move(squares)));
+      outliers_ = UpdateOutliers(SampledResiduals(), HeldOutSd(std::move(squares)));
     }
     report_.rounds.push_back({.finest = space_.finest(),
                               .vertices = space_.Vertices(),
                               .weight = chosen.weight,
-                              .stretch = StretchOf(metric_).stretch,
-                              .direction_deg = StretchOf(metric_).direction_deg,
+                              .stretch = FindStretch(metric_).stretch,
+                              .direction_deg = FindStretch(metric_).direction_deg,
                               .degrees_of_freedom = chosen.degrees_of_freedom,
                               .rms_mm = std::sqrt(chosen.mean_square),
                               .held_out_rms_mm = std::sqrt(held),
                               .steps = steps,
                               .outliers = outliers_});
-    if (!best_ || held * kAsGood < best_->held_square) {
+    if (!best_ || held * kBetterRatio < best_->held_square) {
       best_ = Snapshot{.space = space_,
                        .solution = solve_.Solution(),
                        .weight = weight_,
@@ -282,10 +395,11 @@ class NestedFitter {
     }
   }
 
-  // Points without noise, on a surface that the space holds.
+  // Returns whether the held-out points are met to round-off: points without noise on a surface of
+  // the space.
   bool IsMet() const { return report_.rounds.back().held_out_rms_mm <= rounding_mm_; }
 
-  // As far as one of a point of mean weight that is as likely.
+  // The residual of a point of mean weight that is equally likely.
   Residual Scaled(Residual residual, std::uint32_t k) const {
     for (double& along : residual.along) {
       along *= points_.Scale(k);
@@ -293,22 +407,22 @@ class NestedFitter {
     return residual;
   }
 
-  // Along one axis, by the median.
-  double HeldSd(std::vector<double> squares) const {
+  // The standard deviation of held-out points along one axis, by the median.
+  double HeldOutSd(std::vector<double> squares) const {
     if (squares.empty()) {
       return 0;
     }
     return kSdOfMedian[points_.channels] * std::sqrt(UpperMedian(squares));
   }
 
-  // Where points are crowded, levels of far more patches than points are asked one after another,
-  // as long as the surface comes nearer to the points held out.
-  int FinestAsked() const {
+  // The finest level to test for detail. Levels of far more patches than points, as in crowded
+  // data, are tested one after another, as long as the surface comes nearer to the held-out points.
+  int FinestTested() const {
     const std::size_t few = kPatchesPerPoint * (points_.size() / every_);
     const int next = space_.finest() + (HasComeNearer() ? 1 : 0);
     GridLayout layout = space_[0].layout;
     int level = 0;
-    for (; level < finest_seen_; ++level) {
+    for (; level < sample_finest_; ++level) {
       layout = layout.Finer();
       if (level >= next && layout.Patches() > few) {
         break;
@@ -318,16 +432,18 @@ class NestedFitter {
   }
 
   bool HasComeNearer() const {
-    constexpr double kPlainly = 0.98;
+    constexpr double kClearly = 0.98;  // ratio of held-out errors beyond chance
     const std::vector<NestedRound>& rounds = report_.rounds;
     return rounds.size() < 2 ||
-           rounds.back().held_out_rms_mm < kPlainly * rounds[rounds.size() - 2].held_out_rms_mm;
+           rounds.back().held_out_rms_mm < kClearly * rounds[rounds.size() - 2].held_out_rms_mm;
   }
 
+  // Adds vertices where residuals show detail, or where points are dense. Returns whether the new
+  // ones are worth a round.
   bool Refine() {
     Indices fitted;
     std::vector<Residual> residuals;
-    ForEachLooked([&](std::size_t n, std::uint32_t k) {
+    ForEachSampled([&](std::size_t n, std::uint32_t k) {
       if (!IsHeld(k) && outlier_[k] == 0) {
         fitted.push_back(k);
         residuals.push_back(residuals_[n]);
@@ -335,13 +451,15 @@ class NestedFitter {
     });
     const int vertices = space_.Vertices();
     const UnresolvedDetail detail =
-        FindUnresolvedDetail(points_, space_, FinestAsked(), fitted, residuals);
+        FindUnresolvedDetail(points_, space_, FinestTested(), fitted, residuals);
     const int added = OverlayDetail(detail, space_);
-    return added > (HasComeNearer() ? kFewNew : kFewMore) * vertices || Densify();
+    return added > (HasComeNearer() ? kMinNewShare : kMinNewShareAfterNoGain) * vertices ||
+           Densify();
   }
 
-  // Where most patches show detail, what is finer than the points can tell apart still helps
-  // between them.
+  // Overlays all dense patches of the finest level that most of the domain has. If most patches
+  // show detail, vertices finer than the points can resolve still improve the surface between the
+  // points.
   bool Densify() {
     const bool last_helped = best_->round == std::ssize(report_.rounds) - 1;
     const int level = FinestOfMost();
@@ -349,27 +467,28 @@ class NestedFitter {
         level >= std::min(cap_, IsCheap() ? finest_ + 1 : finest_) || !ClosestAgree()) {
       return false;
     }
-    const double least = IsCheap() ? kCheapDense : kDense;
+    const double points_per_patch = IsCheap() ? kCheapDense : kDense;
     if (level > 0 && HasFoundNothing() &&
-        OverlayDense(points_, level - 1, least, space_) > kFewNew * space_.Vertices()) {
-      return true;  // gaps of that level, where nothing could be found
+        OverlayDense(points_, level - 1, points_per_patch, space_) >
+            kMinNewShare * space_.Vertices()) {
+      return true;  // gaps of the coarser level, where no detail could be found
     }
     densified_ = true;
-    return OverlayDense(points_, level, least, space_) > 0;
+    return OverlayDense(points_, level, points_per_patch, space_) > 0;
   }
 
-  // Detail finer than the points are apart shows in those that chance has put close together, and
-  // noise does not.
+  // Returns whether residuals of points that are close together by chance agree. Detail finer than
+  // the points' spacing shows there, and noise does not.
   bool ClosestAgree() const {
-    const PairCorrelation pairs = ClosestCorrelation(points_, Kept(), KeptResiduals());
-    return pairs.Value() * std::sqrt(static_cast<double>(pairs.Count())) > kSure;
+    const PairCorrelation pairs = ClosestCorrelation(points_, SampledInliers(), InlierResiduals());
+    return pairs.Value() * std::sqrt(static_cast<double>(pairs.Count())) > kMinStandardErrors;
   }
 
-  // Of the points looked at that are no outliers, scaled.
-  std::vector<Residual> KeptResiduals() const {
+  // The residuals of SampledInliers, scaled to mean weight.
+  std::vector<Residual> InlierResiduals() const {
     std::vector<Residual> kept;
     kept.reserve(residuals_.size());
-    ForEachLooked([&](std::size_t n, std::uint32_t k) {
+    ForEachSampled([&](std::size_t n, std::uint32_t k) {
       if (outlier_[k] == 0) {
         kept.push_back(Scaled(residuals_[n], k));
       }
@@ -377,11 +496,11 @@ class NestedFitter {
     return kept;
   }
 
-  // The finest level that most of the domain has.
+  // The finest level that covers at least half of the domain.
   int FinestOfMost() const {
     int level = space_.finest();
     for (; level > 0; --level) {
-      const std::vector<char>& there = space_[level].there;
+      const std::vector<char>& there = space_[level].present;
       if (2 * std::count(there.begin(), there.end(), 1) >= std::ssize(there)) {
         break;
       }
@@ -389,12 +508,12 @@ class NestedFitter {
     return level;
   }
 
-  // All points, with the smoothness in finer steps. What is left of them is looked at some at a
-  // time.
+  // Fits all points with the best round's space and a finer choice of the weight. Residuals are
+  // computed for some points at a time.
   NestedFitResult Finish() {
     Snapshot best = std::move(*best_);
     best_.reset();
-    residuals_ = std::vector<Residual>();  // frees it, which {} would not
+    residuals_ = std::vector<Residual>();  // frees the memory; {} would not
     every_ = 1;
     space_ = std::move(best.space);
     solve_.Enter(space_);
@@ -409,21 +528,24 @@ class NestedFitter {
       chosen = FitAll(best.known);
     }
     const double mean_weight = points_.mean_weight;
-    if (SparePointsAtSteps(std::sqrt(chosen.score))) {
-      chosen.mean_square *= mean_weight / points_.mean_weight;  // of a point of mean weight
+    if (ReinstateSteps(std::sqrt(chosen.score))) {
+      chosen.mean_square *= mean_weight / points_.mean_weight;  // now of the new mean weight
       FitAll(weight_);
     }
     Report(chosen);
-    NestedFitResult result{.surface = Surface(), .report = {}, .uv = {}, .residual_mm = {}};
+    NestedFitResult result{.surface = MakeSurface(start_, space_, points_, solve_.Displacements()),
+                           .report = {},
+                           .uv = {},
+                           .residual_mm = {}};
     Measure(result);
     result.report = std::move(report_);
     result.uv = UvAsGiven(std::move(points_));
     return result;
   }
 
-  // In the order of the curve, so that the sums do not depend on that as given.
+  // Computes the distances and their statistics, in the order of the curve (invariant 8).
   void Measure(NestedFitResult& result) {
-    constexpr std::size_t kAtOnce = 1 << 14;
+    constexpr std::size_t kAtOnce = 1 << 14;  // points; bounds the memory
     double sum = 0, weights = 0;
     result.residual_mm.resize(points_.GivenSize());
     NestedResiduals residuals(solve_);
@@ -455,34 +577,35 @@ class NestedFitter {
     report_.neighbour_correlation = neighbours.Value();
   }
 
-  // ask(residuals): of all points, at the last solution.
-  template <class Ask>
-  auto AskOfResiduals(const Ask& ask) {
+  // Calls use(residuals) with the residuals of all points at the last solution.
+  template <class Use>
+  auto WithAllResiduals(const Use& use) {
     NestedResiduals residuals(solve_);
-    return ask([&](std::size_t begin, std::size_t end) { return residuals.Of(begin, end); });
+    return use([&](std::size_t begin, std::size_t end) { return residuals.Of(begin, end); });
   }
 
-  // Whether others than before are outliers.
+  // Updates the outliers among all points. Returns whether they changed.
   bool DropOutliers(double noise_mm) {
     if (plan_.outliers == OutlierRule::kKeep) {
       return false;
     }
     const std::vector<char> before = outlier_;
-    AskOfResiduals([&](const ResidualsBetween& residuals) { return Find(residuals, noise_mm); });
+    WithAllResiduals(
+        [&](const ResidualsBetween& residuals) { return UpdateOutliers(residuals, noise_mm); });
     return before != outlier_;
   }
 
-  // Whether some are outliers no more. They take part once smoothness is chosen and noise is known:
-  // before, a step would make all the rest too smooth and pass for noise.
-  bool SparePointsAtSteps(double noise_mm) {
-    const int spared = AskOfResiduals([&](const ResidualsBetween& residuals) {
-      return SpareSheets(points_, residuals, Least(noise_mm), outlier_);
+  // Reinstates outliers at steps. Returns whether there are any. It comes last, when smoothness and
+  // noise are known: before, a step would pass for noise and make all the rest too smooth.
+  bool ReinstateSteps(double noise_mm) {
+    const int reinstated = WithAllResiduals([&](const ResidualsBetween& residuals) {
+      return ReinstateStepPoints(points_, residuals, MinSpread(noise_mm), outlier_);
     });
-    points_.TakeMeanWeight(outlier_);
-    return spared > 0;
+    points_.UpdateMeanWeight(outlier_);
+    return reinstated > 0;
   }
 
-  // known: the weight, or NaN where it is still to be found.
+  // Fits all inliers. known: the weight, or NaN to search for it.
   NestedWeight FitAll(double known) {
     PointChoice kept{.left_out = outlier_};
     const std::size_t count = kept.Count(points_);
@@ -490,26 +613,28 @@ class NestedFitter {
     NestedWeightSearch search(count, solve_, PartLeft(), least_gain_);
     NestedWeight chosen;
     if (std::isnan(known)) {
-      search.Climb(2, weight_);
-      chosen = IsQuick() ? search.Finish() : search.Settle(search.Between());
+      search.Climb(kFineFactor, weight_);
+      chosen = IsQuick() ? search.Finish() : search.FinalSolve(search.Between());
     } else {
-      chosen = search.Settle(known);
+      chosen = search.FinalSolve(known);
     }
     weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
     return chosen;
   }
 
+  // Fills the report, except for the statistics of distances (Measure).
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
-    report_.stretch = StretchOf(metric_).stretch;
-    report_.direction_deg = StretchOf(metric_).direction_deg;
+    report_.stretch = FindStretch(metric_).stretch;
+    report_.direction_deg = FindStretch(metric_).direction_deg;
     report_.weighted = points_.weighted;
     report_.met_to_rounding = report_.held_out_rms_mm <= rounding_mm_;
     report_.limited_by_density =
         !report_.met_to_rounding && finest_ < cap_ && FinestOfMost() >= finest_;
-    const Indices kept = Kept();
+    const Indices kept = SampledInliers();
     const double left = 1 - chosen.degrees_of_freedom / static_cast<double>(kept.size());
-    report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, 0.02));
+    constexpr double kMinLeft = 0.02;  // the trace of one probe is no more accurate than this
+    report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, kMinLeft));
     report_.neighbour_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kQuadraticOf20);
     report_.closer_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kPlaneOf8);
     for (std::uint32_t k = 0; k < points_.size(); ++k) {
@@ -521,7 +646,7 @@ class NestedFitter {
     ReportRepeated();
   }
 
-  // A copy of an outlier is one too.
+  // Reports copies. A copy of an outlier is an outlier too.
   void ReportRepeated() {
     std::vector<std::uint32_t> copies;
     for (const RepeatedPoint& copy : points_.repeated) {
@@ -535,79 +660,30 @@ class NestedFitter {
     std::sort(report_.repeated.begin(), report_.repeated.end());
   }
 
-  Vec3 InSpace(const GridValues& values, int i, int j) const {
-    Vec3 sum = Vec3::Zero();
-    for (int c = 0; c < points_.channels; ++c) {
-      sum += values.Row(c, j)[i] * points_.axes.col(c);
-    }
-    return sum;
-  }
-
-  // Level by level: an offset is measured from the next coarser surface, in its frame or the
-  // world's.
-  HSplineSurface Surface() {
-    const NestedValues& displacements = solve_.Displacements();
-    HSplineShape shape = start_.shape();
-    shape.max_level = space_.finest();
-    ControlNet net = start_.Net(0);
-    for (int j = 0; j < net.rows; ++j) {
-      for (int i = 0; i < net.columns; ++i) {
-        net.At(i, j) += InSpace(displacements[0], i, j);
-      }
-    }
-    HSplineSurface surface(shape, net);
-    ControlNet rest = start_.Net(0);
-    for (int level = 1; level <= space_.finest(); ++level) {
-      rest = Refine(shape, rest, level - 1);
-      surface.SetOffsets(OffsetsOf(level, rest, displacements[level], surface));
-    }
-    return surface;
-  }
-
-  static ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level) {
-    return semblance::Refine(shape, net, level);
-  }
-
-  std::map<VertexId, std::optional<Vec3>> OffsetsOf(int level, const ControlNet& rest,
-                                                    const GridValues& displacements,
-                                                    const HSplineSurface& surface) const {
-    std::map<VertexId, std::optional<Vec3>> offsets;
-    const NestedLevel& nested = space_[level];
-    const bool world = surface.shape().reference == OffsetReference::kWorld;
-    for (int i = 0; i < rest.columns; ++i) {
-      for (int j = 0; j < rest.rows; ++j) {
-        if (nested.active[nested.layout.At(i, j)] == 0 || space_.IsCovered(level, i, j)) {
-          continue;
-        }
-        const VertexId vertex{level, i, j};
-        const SurfaceFrame frame = surface.LevelFrame(level - 1, surface.ParameterOf(vertex));
-        const Vec3 way = rest.At(i, j) + InSpace(displacements, i, j) - frame.point;
-        offsets.emplace_hint(offsets.end(), vertex,
-                             world ? way : Vec3(frame.axes.transpose() * way));
-      }
-    }
-    return offsets;
-  }
-
+  // Fixed during the fit.
   const HSplineSurface& start_;
   const AutoPlan& plan_;
   const RunContext& context_;
-  NestedPoints points_;
+  NestedPoints points_;  // only mean_weight changes (invariant 3)
   NestedSolve solve_;
-  double rounding_mm_;
+  double rounding_mm_;  // held-out error that is round-off
   NestedSpace space_;
-  int cap_;  // level
-  std::vector<char> outlier_;
-  int finest_ = 0, outliers_ = 0;
-  std::size_t every_ = 0;            // point of the curve is looked at
-  int finest_seen_ = 0;              // level on which those show something
-  std::vector<Residual> residuals_;  // of those that are looked at
+  int cap_;                    // finest level that the plan and the shape allow
+  std::vector<char> outlier_;  // per point
+  int finest_ = 0;             // finest level that the density of all points allows
+  // The sample and its residuals (invariant 2).
+  std::size_t every_ = 0;            // one point in every_ is sampled
+  int sample_finest_ = 0;            // finest level that the density of the sample allows
+  std::vector<Residual> residuals_;  // of the sampled points
+  int outliers_ = 0;                 // number among the sampled points
+  // The last search (invariant 6).
   double weight_ = kNaN, least_gain_ = 0;
-  double between_ = kNaN;  // weight of the last search (NestedWeightSearch::Between)
+  double between_ = kNaN;  // NestedWeightSearch::Between
   BendingMetric metric_ = BendingMetric::Identity();
-  int finest_scanned_ = -1;  // level
-  bool densified_ = false;
-  std::optional<Snapshot> best_;
+  int finest_scanned_ = -1;  // finest level at which stretched metrics were tried
+  // The progress.
+  bool densified_ = false;        // Densify has overlaid a whole level
+  std::optional<Snapshot> best_;  // invariant 5
   AutoReport report_;
 };
 
@@ -625,9 +701,9 @@ void CheckWeights(const ScatteredPoints& points) {
 
 void CheckNested(const HSplineSurface& start, const ScatteredPoints& points) {
   if (!start.Offsets().empty()) {
-    Fail("the start has detail of finer levels; start from one without, or take plan adaptive");
+    Fail("the start has detail of finer levels; give a start without it, or use plan adaptive");
   }
-  if (points.size() < kFewestPoints) {
+  if (points.size() < kMinPoints) {
     FailForFew(points.size(), "");
   }
   CheckWeights(points);
@@ -637,15 +713,15 @@ void CheckNested(const HSplineSurface& start, const ScatteredPoints& points) {
   }
 }
 
-void TellOf(const HSplineSurface& surface, const ScatteredPoints& points,
-            std::span<const double> residual_mm, int threads, AutoReport& report) {
-  constexpr double kPlainly = 1.2;
+void UpdateReport(const HSplineSurface& surface, const ScatteredPoints& points,
+                  std::span<const double> residual_mm, int threads, AutoReport& report) {
+  constexpr double kClearly = 1.2;  // ratio of distances from which the report no longer holds
   NestedPoints left = DisplacementsFrom(surface, points, threads);
   std::vector<char> outlier(left.size(), 0);
   for (std::size_t k = 0; k < left.size(); ++k) {
     outlier[k] = std::ranges::binary_search(report.outliers, left.given[k]) ? 1 : 0;
   }
-  left.TakeMeanWeight(outlier);
+  left.UpdateMeanWeight(outlier);
   double before = 0, after = 0;
   PairCorrelation neighbours;
   std::optional<Residual> last;
@@ -662,10 +738,10 @@ void TellOf(const HSplineSurface& surface, const ScatteredPoints& points,
     }
   }
   report.neighbour_correlation = neighbours.Value();
-  if (before > 0) {  // as many parameters as before, or as good as
+  if (before > 0) {  // assumes about as many parameters as before
     report.noise_mm *= std::sqrt(after / before);
   }
-  if (after > kPlainly * kPlainly * before) {
+  if (after > kClearly * kClearly * before) {
     report.held_out_rms_mm = kNaN;
     report.limited_by_density = false;
     report.met_to_rounding =
@@ -675,7 +751,7 @@ void TellOf(const HSplineSurface& surface, const ScatteredPoints& points,
 
 NestedFitResult FitNested(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
                           const RunContext& context) {
-  if (points.size() < kFewestPoints) {
+  if (points.size() < kMinPoints) {
     FailForFew(points.size(), points.repeated.empty() ? "" : " that differ");
   }
   return NestedFitter(start, std::move(points), plan, context).Run();

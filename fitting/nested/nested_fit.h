@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The fit that asks for no tolerance: how fine, how smooth and which points to believe follow from
-// the points (`plan: auto`).
+// The nested fit (`plan: auto`): it needs no tolerance, and chooses the resolution, the smoothness
+// and the outliers from the points.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "fitting/nested/nested_points.h"
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/problem/fit_target.h"
 #include "surfaces/base/run_context.h"
@@ -17,57 +18,73 @@ namespace semblance {
 
 struct NestedRound {
   int finest = -1;                   // level
-  int vertices = -1;                 // that say something of their own
+  int vertices = -1;                 // independent vertices (NestedSpace::Vertices)
   double weight = kNaN;              // of the thin-plate energy, mm^4 (SmoothnessTerm, length_mm 1)
-  double stretch = 1;                // of the lengths in which it is measured (SmoothnessTerm)
-  double direction_deg = 0;          // of the stretch
+  double stretch = 1;                // of bending (SmoothnessTerm)
+  double direction_deg = 0;          // direction of the stretch
   double degrees_of_freedom = kNaN;  // trace of the influence matrix
-  double rms_mm = kNaN;              // of the points that were fitted, along one axis, weighted
-  double held_out_rms_mm = kNaN;     // of the points that were not, weighted
-  int steps = -1;                    // of conjugate gradients
+  double rms_mm = kNaN;              // of the fitted points along one axis, weighted
+  double held_out_rms_mm = kNaN;     // of the points held out along one axis, weighted
+  int steps = -1;                    // steps of conjugate gradients
   int outliers = -1;
 };
 
-// What the fit assumed, and how far that holds. Of points with weights what is said of noise and of
-// points held out is said of one of mean weight: errors count by sqrt(weight / mean weight), the
-// mean being that of the points that are no outliers.
+// The assumptions of the fit, and measures of their validity. For points with weights, noise and
+// held-out errors refer to an inlier of mean weight: errors are multiplied by sqrt(weight / mean
+// weight), where the mean is over the points that are not outliers.
 struct AutoReport {
   std::vector<NestedRound> rounds;
   int chosen_round = -1;
-  double weight = kNaN;                 // of the thin-plate energy, as NestedRound; all points
-  double length_mm = 1;                 // of the smoothness that the weights are for
-  double stretch = 1;                   // likewise
-  double direction_deg = 0;             // likewise
+  double weight = kNaN;                 // of the final fit to all points, as in NestedRound
+  double length_mm = 1;                 // SmoothnessTerm::length_mm of the weights
+  double stretch = 1;                   // of the final fit
+  double direction_deg = 0;             // of the final fit
   double noise_mm = kNaN;               // standard deviation of a point along one axis, by the fit
-  double neighbour_noise_mm = kNaN;     // by a quadratic through each point's 20 neighbours
-  double closer_noise_mm = kNaN;        // by a plane through 8: less, if detail passes for noise
-  double held_out_rms_mm = kNaN;        // along one axis, of a tenth that took no part
-  double neighbour_correlation = kNaN;  // of residuals of points that are next to each other
-  bool weighted = false;                // some points weigh more than others
-  bool met_to_rounding = false;         // held out to 1e-8 of the extent: nothing to refine for
-  bool limited_by_density = false;      // finer vertices would have fewer points than they need
-  std::vector<std::uint32_t> outliers;  // indices as given, ascending; they have no weight
-  std::vector<std::uint32_t> repeated;  // likewise, of copies of other points; those count once
+  double neighbour_noise_mm = kNaN;     // the same, by quadratics through 20 neighbours
+  double closer_noise_mm = kNaN;        // by planes through 8; smaller if detail passes for noise
+  double held_out_rms_mm = kNaN;        // along one axis, of the tenth that was held out
+  double neighbour_correlation = kNaN;  // of residuals of consecutive points on the curve
+  bool weighted = false;                // the points' weights differ
+  bool met_to_rounding = false;         // held-out points are met to 1e-8 of the extent
+  bool limited_by_density = false;      // finer vertices would have too few points
+  std::vector<std::uint32_t> outliers;  // given indices, ascending; these points have no weight
+  std::vector<std::uint32_t> repeated;  // given indices of copies, ascending; copies count once
 };
 
 struct NestedFitResult {
-  HSplineSurface surface;  // its finest level is the finest that has vertices
+  HSplineSurface surface;  // its max_level is the finest level with vertices
   AutoReport report;
-  std::vector<Vec2> uv;             // per point as given
-  std::vector<double> residual_mm;  // per point as given: its distance from the surface
-  double rms_mm = kNaN;             // of the distances, weighted
+  std::vector<Vec2> uv;             // in the given order
+  std::vector<double> residual_mm;  // distances from the surface, in the given order
+  double rms_mm = kNaN;             // root mean square of the distances, weighted
 };
 
-// A tenth of the points is held out. In rounds: the thin-plate weight by generalised
-// cross-validation, and with the plan's `stretched` in which lengths it measures bending; outliers
-// (outlier_search.h), and finer vertices where residuals are correlated (unresolved_detail.h), as
-// long as there are such places or points are dense. Of all rounds the one that predicts the points
-// held out best, or within a tenth of a per cent the coarsest, is fitted again to all points. With
-// many points the first rounds look at some of them.
-//   start: without detail; what it leaves of the points is smoothed, not the surface itself.
-// Copies of a point count once. Throws InputError for a start with detail, without extent, or fewer
-// than 16 points that differ; Cancelled.
+// Fits a surface in rounds, with a tenth of the points held out. A round chooses the thin-plate
+// weight by generalised cross-validation, and with the plan's `stretched` the metric of bending; it
+// finds outliers (outlier_search.h), and adds finer vertices where residuals are correlated
+// (unresolved_detail.h) or points are dense. The round that predicts the held-out points best
+// (within 0.1 %, the coarsest) is then fitted to all points. With many points the first rounds use
+// a sample. nested_fit.cc shows the states and invariants.
+//   start: without detail. Its difference from the points is smoothed, not the surface itself.
+// Copies of a point count once. Throws InputError for a start with detail or without extent, or for
+// fewer than 16 distinct points; Cancelled.
 NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& points,
                           const AutoPlan& plan, const RunContext& context);
+
+// The following functions split FitNested into steps, between which the given points may be freed.
+
+// Throws InputError like FitNested.
+void CheckNested(const HSplineSurface& start, const ScatteredPoints& points);
+
+// points: made by DisplacementsFrom or TakeDisplacements from points that passed CheckNested.
+NestedFitResult FitNested(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
+                          const RunContext& context);
+
+// Updates the report for another surface, which other terms or exact points have made of the fitted
+// one. Noise and the correlation of neighbours become those of `surface`. If it is clearly farther
+// from the points, the statements about held-out points, density and round-off are withdrawn.
+//   residual_mm: distances from the fitted surface.
+void UpdateReport(const HSplineSurface& surface, const ScatteredPoints& points,
+                  std::span<const double> residual_mm, int threads, AutoReport& report);
 
 }  // namespace semblance

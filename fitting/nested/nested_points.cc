@@ -13,13 +13,14 @@
 namespace semblance {
 namespace {
 
-// A shape with levels, whose points are sorted along a Z-curve.
+// The shape with more than one level, so that CurveOrder sorts along a Z-curve.
 HSplineShape WithLevels(HSplineShape shape) {
   shape.max_level = 1;
   return shape;
 }
 
-// In place: what is at order[k] goes to k. One column at a time, so that it takes little memory.
+// Permutes in place, so that the row at order[k] moves to k. It handles one column at a time to
+// save memory.
 template <class Row>
 void SortBy(std::span<const std::uint32_t> order, std::vector<Row>& rows) {
   std::vector<double> column(rows.size());
@@ -33,10 +34,10 @@ void SortBy(std::span<const std::uint32_t> order, std::vector<Row>& rows) {
   }
 }
 
-// Positions become displacements from the start; a bounded number of points at once.
+// Turns positions into displacements from the start, for a bounded number of points at a time.
 void SubtractStart(const HSplineSurface& start, std::span<const Vec2> uv, int threads,
                    std::vector<Vec3>& positions) {
-  constexpr std::size_t kAtOnce = 1 << 16;
+  constexpr std::size_t kAtOnce = 1 << 16;  // bounds the memory
   const HSplineBatch batch(start);
   for (std::size_t begin = 0; begin < uv.size(); begin += kAtOnce) {
     const std::size_t count = std::min(kAtOnce, uv.size() - begin);
@@ -55,9 +56,9 @@ double Extent(std::span<const Vec3> positions) {
   return largest;
 }
 
-// The principal axes along which some point is off by more than rounding; at least one.
-Eigen::Matrix<double, 3, Eigen::Dynamic> AxesOf(const NestedPoints& points, double extent) {
-  constexpr double kRounding = 1e-12;
+// The principal axes along which some displacement exceeds round-off; at least one.
+Eigen::Matrix<double, 3, Eigen::Dynamic> PrincipalAxes(const NestedPoints& points, double extent) {
+  constexpr double kRounding = 1e-12;  // relative to the extent
   Mat3 moments = Mat3::Zero();
   for (const Vec3& d : points.value) {
     moments += d * d.transpose();
@@ -74,8 +75,8 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> AxesOf(const NestedPoints& points, doub
   return all.rightCols(channels);
 }
 
-// Copies stand next to each other on the curve.
-void TakeRepeatedApart(NestedPoints& points) {
+// Moves copies of points to points.repeated. Copies are adjacent on the curve.
+void SeparateCopies(NestedPoints& points) {
   const auto is_copy = [&](std::size_t a, std::size_t b) {
     return points.uv[a] == points.uv[b] && points.value[a] == points.value[b] &&
            points.Weight(a) == points.Weight(b);
@@ -100,7 +101,7 @@ void TakeRepeatedApart(NestedPoints& points) {
   points.weight.resize(points.weight.empty() ? 0 : kept);
 }
 
-// From along x, y and z to along the axes.
+// Turns displacements along x, y and z into displacements along the axes.
 void TurnToAxes(NestedPoints& points) {
   for (Vec3& value : points.value) {
     const Vec3 d = value;
@@ -113,8 +114,8 @@ void TurnToAxes(NestedPoints& points) {
 
 }  // namespace
 
-// To the bit that of all where they are equal, so that equal weights change nothing.
-void NestedPoints::TakeMeanWeight(const std::vector<char>& left_out) {
+// If all weights are equal, the mean is exactly this weight, so that equal weights have no effect.
+void NestedPoints::UpdateMeanWeight(const std::vector<char>& left_out) {
   double sum = 0, least = std::numeric_limits<double>::infinity(), most = 0;
   std::size_t count = 0;
   for (std::size_t k = 0; k < weight.size(); ++k) {
@@ -146,11 +147,11 @@ NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints given, i
   for (std::size_t k = 0; k < given.weights.size(); ++k) {
     points.weight.push_back(given.weights[points.given[k]]);
   }
-  TakeRepeatedApart(points);
-  points.TakeMeanWeight({});
+  SeparateCopies(points);
+  points.UpdateMeanWeight({});
   points.weighted =
       std::ranges::any_of(points.weight, [&](double weight) { return weight != points.weight[0]; });
-  points.axes = AxesOf(points, extent);
+  points.axes = PrincipalAxes(points, extent);
   points.channels = static_cast<int>(points.axes.cols());
   TurnToAxes(points);
   return points;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The points of a nested fit, as displacements from where the surface starts.
+// The points of a nested fit, as displacements from the start surface.
 #pragma once
 
 #include <Eigen/Core>
@@ -15,65 +15,66 @@
 
 namespace semblance {
 
-// Points that a fit may take apart.
+// Points whose memory a fit may reuse.
 struct OwnedPoints {
   std::vector<Vec3> positions;       // mm
   std::vector<Vec2> uv;              // in [0,1] x [0,1], one per point
-  std::vector<double> weights = {};  // > 0, one per point; or none: all 1
+  std::vector<double> weights = {};  // > 0, one per point; empty: all 1
 
   ScatteredPoints View() const { return {positions, uv, weights}; }
 };
 
-// A point that was given before: at the same (u,v), in the same place and with the same weight.
+// A copy of an earlier point, with the same (u,v), position and weight.
 struct RepeatedPoint {
-  std::uint32_t given = 0;  // its index
-  std::uint32_t first = 0;  // of the one that stands for it
+  std::uint32_t given = 0;  // given index of the copy
+  std::uint32_t first = 0;  // given index of the original
   double weight = 1;
 };
 
-// Sorted along a Z-curve, so that points that follow each other are neighbours; their order as
-// given has no effect. Only directions in which some point is off the start are channels: a height
-// field over its plane has one. A point that was given several times is here once, for copies tell
-// nothing of noise. All that a point takes is its (u,v), its displacement and an index: 44 bytes.
+// Points sorted along a Z-curve, so that consecutive points are neighbours and the given order has
+// no effect. A channel is a direction along which some point differs from the start: a height field
+// over its plane has one channel. Copies of a point are kept apart, because they would look like
+// points without noise. A point takes 44 bytes: (u,v), displacement and index.
 struct NestedPoints {
-  std::vector<Vec2> uv;        // in [0,1] x [0,1], as given
-  Vec2 patches = {1, 1};       // of level 0
-  bool periodic_u = false;     // u = 1 is u = 0
-  std::vector<double> weight;  // > 0; or none: all 1
-  double mean_weight = 1;      // of those that count (TakeMeanWeight)
-  bool weighted = false;       // some weigh more than others
-  std::vector<Vec3> value;     // displacement along each channel's axis, mm; zero beyond those
-  std::vector<std::uint32_t> given;
-  std::vector<RepeatedPoint> repeated;  // that are not among these
+  std::vector<Vec2> uv;                 // in [0,1] x [0,1], as given
+  Vec2 patches = {1, 1};                // numbers of patches of level 0
+  bool periodic_u = false;              // u = 1 is u = 0
+  std::vector<double> weight;           // > 0; empty: all 1
+  double mean_weight = 1;               // of the points that count (UpdateMeanWeight)
+  bool weighted = false;                // the weights differ
+  std::vector<Vec3> value;              // displacement per channel, mm; 0 beyond the last channel
+  std::vector<std::uint32_t> given;     // given index of each point
+  std::vector<RepeatedPoint> repeated;  // copies, which are not in the arrays above
   int channels = 0;
   Eigen::Matrix<double, 3, Eigen::Dynamic> axes{3, 0};  // orthonormal, a column per channel
 
   std::size_t size() const { return uv.size(); }
   std::size_t GivenSize() const { return uv.size() + repeated.size(); }
-  // Where it is, in patches of level 0: to the bit what PatchPointAt makes of (u,v).
+  // The place of point k in patches of level 0; bit-identical to PatchPointAt.
   double X(std::size_t k) const {
     return periodic_u && uv[k].x() == 1 ? 0 : uv[k].x() * patches.x();
   }
   double Y(std::size_t k) const { return uv[k].y() * patches.y(); }
   double Weight(std::size_t k) const { return weight.empty() ? 1 : weight[k]; }
-  // 1 for a point of mean weight. A weight is 1 / sigma^2 up to a factor, so that errors times this
-  // are of one size if the points' sigma are right.
+  // sqrt(weight / mean weight). A weight is proportional to 1 / sigma^2, so errors times this
+  // factor have the same size if the points' sigma are right.
   double Scale(std::size_t k) const {
     return weight.empty() ? 1 : std::sqrt(weight[k] / mean_weight);
   }
-  // left_out: per point, not 0 for one that does not count; or none.
-  void TakeMeanWeight(const std::vector<char>& left_out);
+  // Sets mean_weight over the points with left_out 0; left_out: per point, or empty.
+  void UpdateMeanWeight(const std::vector<char>& left_out);
 };
 
+// Makes the points of a nested fit from a copy of the given points.
 NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoints& points,
                                int threads);
-// The same in the memory of the points, which are taken apart.
+// Makes the points of a nested fit in the memory of the given points.
 NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints points, int threads);
 
-// Which points take part: one in `every`, but for those left out.
+// A choice of points: one in `every`, except those left out.
 struct PointChoice {
   std::size_t every = 1;
-  std::vector<char> left_out = {};  // per point, not 0 for one that is; or none
+  std::vector<char> left_out = {};  // per point, 0: it takes part; empty: all do
 
   bool Has(std::size_t k) const { return left_out.empty() || left_out[k] == 0; }
   std::size_t Count(const NestedPoints& points) const {
@@ -85,10 +86,10 @@ struct PointChoice {
   }
 };
 
-// The (u,v) in the order in which they were given.
+// The (u,v) in the given order, including those of copies.
 std::vector<Vec2> UvAsGiven(NestedPoints points);
 
-// A point's patch on a level, by x and y in patches of level 0.
+// The patch of a level that contains the place (x, y), in patches of level 0.
 inline std::array<int, 2> PatchOn(const PatchGrid& grid, int level, double x, double y) {
   const double scale = 1 << level;
   return {std::clamp(static_cast<int>(x * scale), 0, grid.patches_u - 1),

@@ -11,11 +11,11 @@
 namespace semblance {
 namespace {
 
-constexpr int kMostSteps = 300;
+constexpr int kMaxSteps = 300;  // solves take up to about 80 steps (docs/fit.md); bounds the loop
 
 using Shares = std::vector<std::vector<double>>;  // by level and patch
 
-// Of the squares of a patch's sixteen weights over the patch.
+// The mean over a patch of the squares of its sixteen B-splines.
 std::array<double, 16> MeanSquares() {
   constexpr std::array<double, 4> one = {1.0 / 252, 33.0 / 140, 33.0 / 140, 1.0 / 252};
   std::array<double, 16> squares;
@@ -34,7 +34,7 @@ void Scatter(const GridLayout& layout, int i, int j, const std::array<double, 16
   }
 }
 
-// A patch's quantity, summed from the finest level up.
+// Adds the values of the finer level's patches, times a factor, to their parents.
 void SumUp(const GridLayout& finer, const std::vector<double>& of_finer, double factor,
            const GridLayout& coarser, std::vector<double>& of_coarser) {
   for (int j = 0; j < finer.grid.patches_v; ++j) {
@@ -44,7 +44,7 @@ void SumUp(const GridLayout& finer, const std::vector<double>& of_finer, double 
   }
 }
 
-// Of patches side by side: where the first one's sixteen vertices begin, row by row.
+// The four rows of vertices of adjacent patches, each from the first patch's first vertex on.
 using PatchRows = std::array<const double*, 4>;
 
 SEMBLANCE_INLINE Wider FormOfEight(const Matrix16& form, const PatchRows& rows, int first) {
@@ -63,8 +63,8 @@ SEMBLANCE_INLINE Wider FormOfEight(const Matrix16& form, const PatchRows& rows, 
   return 2 * sum;
 }
 
-// The sum of vertices^T form vertices over patches side by side. The last eight may reach into the
-// room behind a row.
+// The sum of vertices^T form vertices over adjacent patches. The last block of eight may reach into
+// the space behind a row.
 SEMBLANCE_WIDE double SumOfForms(const Matrix16& form, const PatchRows& rows, int count) {
   constexpr int kBlock = GridLayout::kBlock;
   Wider sum = {};
@@ -80,7 +80,7 @@ SEMBLANCE_WIDE double SumOfForms(const Matrix16& form, const PatchRows& rows, in
   return all;
 }
 
-// Of a patch; the halo must be filled.
+// Copies the sixteen vertices of a patch; the halo must be filled.
 void Gather(const GridValues& values, int channel, int i, int j, std::array<double, 16>& vertices) {
   for (int b = 0; b < 4; ++b) {
     std::copy_n(values.Row(channel, j + b) + i, 4, vertices.begin() + 4 * b);
@@ -121,7 +121,7 @@ void NestedSolve::Begin(const NestedSpace& space, PointChoice used, const Bendin
     if (space[level].leaves) {
       system.matrix = StencilMatrix(layout, RunsAround(layout, system.leaves));
     }
-    system.energy = EnergyOf(layout.grid);
+    system.energy = PatchEnergy(layout.grid);
     data_shares.emplace_back(layout.Patches(), 0.0);
   }
   right_ = Zeros();
@@ -138,7 +138,8 @@ void NestedSolve::Begin(const NestedSpace& space, PointChoice used, const Bendin
   even_weight_ = data / MakeEnergyDiagonals() / std::max(weight_sum_, 1e-300);
 }
 
-// Points of one leaf follow each other. visit(leaf, indices).
+// Calls visit(leaf, indices) for the chosen points of each leaf. The points of a leaf are
+// consecutive.
 template <class Visit>
 void NestedSolve::ForEachLeaf(std::size_t begin, std::size_t end, const PointChoice& choice,
                               const Visit& visit) const {
@@ -182,27 +183,28 @@ void NestedSolve::AddPoints(Shares& data_shares) {
   ForEachLeaf(0, points_.size(), used_, add);
 }
 
-Matrix16 NestedSolve::EnergyOf(const PatchGrid& grid) const {
+Matrix16 NestedSolve::PatchEnergy(const PatchGrid& grid) const {
   return ThinPlateStiffness(lengths_mm_.x() / grid.patches_u, lengths_mm_.y() / grid.patches_v,
                             metric_) /
          lengths_mm_.prod();
 }
 
-// visit(i, j, patch): of the patches that are there.
+// Calls visit(i, j, patch) for each patch that is present.
 template <class Visit>
 void NestedSolve::ForEachPatch(int level, const Visit& visit) const {
   const GridLayout& layout = (*space_)[level].layout;
   for (int j = 0; j < layout.grid.patches_v; ++j) {
     for (int i = 0; i < layout.grid.patches_u; ++i) {
       const std::size_t patch = layout.Patch(i, j);
-      if ((*space_)[level].there[patch] != 0) {
+      if ((*space_)[level].present[patch] != 0) {
         visit(i, j, patch);
       }
     }
   }
 }
 
-// What each vertex of each level would see of the points, were the level alone. Returns the sum.
+// Computes the diagonal of the points' matrix of each level, as if the level were alone and the
+// points were spread evenly over each patch. Returns its sum.
 double NestedSolve::MakeDataDiagonals(Shares shares) {
   static const std::array<double, 16> squares = MeanSquares();
   double sum = 0;
@@ -222,7 +224,7 @@ double NestedSolve::MakeDataDiagonals(Shares shares) {
   return std::accumulate(squares.begin(), squares.end(), 0.0) * sum;
 }
 
-// The same of the energy at weight 1.
+// Computes the diagonal of the energy's matrix of each level at weight 1. Returns its sum.
 double NestedSolve::MakeEnergyDiagonals() {
   Shares shares;
   for (const LevelSystem& system : levels_) {
@@ -246,7 +248,7 @@ double NestedSolve::MakeEnergyDiagonals() {
   return sum;
 }
 
-// visit(i, j, count): of leaves of a level side by side.
+// Calls visit(i, j, count) for each run of adjacent leaves of a level.
 template <class Visit>
 void NestedSolve::ForEachLeafRun(int level, const Visit& visit) const {
   const std::vector<char>& leaves = levels_[level].leaves;
@@ -262,7 +264,7 @@ void NestedSolve::ForEachLeafRun(int level, const Visit& visit) const {
   }
 }
 
-// Adds to the matrices what form_of(system) is, once per leaf.
+// Adds the matrix form_of(system) once per leaf.
 template <class FormOf>
 void NestedSolve::AddToLeaves(const FormOf& form_of) {
   for (int level = 0; level <= Finest(); ++level) {
@@ -273,7 +275,7 @@ void NestedSolve::AddToLeaves(const FormOf& form_of) {
   }
 }
 
-// The matrix as it stands has the weight of the last call.
+// The matrix already contains the energy with the last weight, so only the difference is added.
 void NestedSolve::SetWeight(double weight) {
   const double more = (weight - weight_) * weight_sum_;
   weight_ = weight;
@@ -294,14 +296,15 @@ void NestedSolve::SetMetric(const BendingMetric& metric) {
   const double factor = weight_ * weight_sum_;
   AddToLeaves([&](const LevelSystem& system) -> Matrix16 { return -factor * system.energy; });
   for (int level = 0; level <= Finest(); ++level) {
-    levels_[level].energy = EnergyOf((*space_)[level].layout.grid);
+    levels_[level].energy = PatchEnergy((*space_)[level].layout.grid);
   }
   AddToLeaves([&](const LevelSystem& system) -> Matrix16 { return factor * system.energy; });
   MakeEnergyDiagonals();
   Invert();
 }
 
-void NestedSolve::Absolute(const NestedValues& x) {
+// Sets absolute_ to the total displacements: the refined coarser levels plus x.
+void NestedSolve::SumLevels(const NestedValues& x) {
   for (int level = 0; level <= Finest(); ++level) {
     for (int c = 0; c < Channels(); ++c) {
       CopyOn(Runs(level), x[level].Channel(c), absolute_[level].Channel(c));
@@ -314,7 +317,7 @@ void NestedSolve::Absolute(const NestedValues& x) {
 }
 
 void NestedSolve::Multiply(const NestedValues& x, NestedValues& product) {
-  Absolute(x);
+  SumLevels(x);
   for (int level = 0; level <= Finest(); ++level) {
     product[level].Clear(Runs(level));
     if (!levels_[level].matrix.empty()) {
@@ -328,7 +331,7 @@ void NestedSolve::Multiply(const NestedValues& x, NestedValues& product) {
   product[0].FoldHalo(Runs(0));
 }
 
-GridStep NestedSolve::StepOf(int level, int channel) {
+GridStep NestedSolve::MakeStep(int level, int channel) {
   return {.inverse = levels_[level].inverse.Channel(0),
           .product = product_[level].Channel(channel),
           .direction = direction_[level].Channel(channel),
@@ -336,7 +339,7 @@ GridStep NestedSolve::StepOf(int level, int channel) {
           .solution = solution_[level].Channel(channel)};
 }
 
-// Of part(level).
+// The sum of part(level) over all levels.
 template <class Part>
 double NestedSolve::Sum(const Part& part) const {
   double sum = 0;
@@ -346,37 +349,40 @@ double NestedSolve::Sum(const Part& part) const {
   return sum;
 }
 
-// The residual at the present solution, and the first direction.
+// Computes the residual at the present solution, and the first direction.
 NestedSolve::ChannelGain NestedSolve::Begin(int channel, double least_gain) {
-  constexpr double kRounding = 1e-16, kProbe = 1e-2;  // of what there was to gain at first
+  // Remaining gain at which a channel ends, relative to the gain at solution 0: round-off, and for
+  // the probe an accuracy of the trace of about 1 %.
+  constexpr double kRounding = 1e-16, kProbe = 1e-2;
   const double at_first = Sum([&](int level) {
     CopyOn(Runs(level), right_[level].Channel(channel), residual_[level].Channel(channel));
-    return SquaresOn(Runs(level), StepOf(level, channel).inverse,
+    return SquaresOn(Runs(level), MakeStep(level, channel).inverse,
                      residual_[level].Channel(channel));
   });
   const bool probe = channel == points_.channels;
   ChannelGain gain;
   gain.enough = probe ? kProbe * at_first : std::max(kRounding * at_first, least_gain);
   gain.left = Sum([&](int level) {
-    const GridStep step = StepOf(level, channel);
+    const GridStep step = MakeStep(level, channel);
     return SubtractOn(Runs(level), step.inverse, step.product, step.residual);
   });
   for (int level = 0; level <= Finest(); ++level) {
-    TurnOn(Runs(level), StepOf(level, channel), 0);
+    TurnOn(Runs(level), MakeStep(level, channel), 0);
   }
   return gain;
 }
 
-// A step of conjugate gradients along a channel's direction, whose product is at hand.
+// Takes a step of conjugate gradients along a channel's direction; product_ holds the matrix times
+// the direction.
 void NestedSolve::Advance(int channel, ChannelGain& gain) {
   const double curvature = Sum([&](int level) {
     return DotOn(Runs(level), direction_[level].Channel(channel), product_[level].Channel(channel));
   });
   const double length = curvature > 0 ? gain.left / curvature : 0;
   const double next =
-      Sum([&](int level) { return AdvanceOn(Runs(level), StepOf(level, channel), length); });
+      Sum([&](int level) { return AdvanceOn(Runs(level), MakeStep(level, channel), length); });
   for (int level = 0; level <= Finest(); ++level) {
-    TurnOn(Runs(level), StepOf(level, channel), gain.left > 0 ? next / gain.left : 0);
+    TurnOn(Runs(level), MakeStep(level, channel), gain.left > 0 ? next / gain.left : 0);
   }
   gain.left = next;
 }
@@ -388,7 +394,7 @@ int NestedSolve::Solve(double least_gain) {
     gains.push_back(Begin(c, least_gain));
   }
   int steps = 0;
-  for (; steps < kMostSteps && std::ranges::any_of(gains, &ChannelGain::IsMore); ++steps) {
+  for (; steps < kMaxSteps && std::ranges::any_of(gains, &ChannelGain::IsMore); ++steps) {
     Multiply(direction_, product_);
     for (int c = 0; c < Channels(); ++c) {
       Advance(c, gains[c]);
@@ -397,8 +403,8 @@ int NestedSolve::Solve(double least_gain) {
   return steps;
 }
 
-// At the last solution x: with (N^T W N + w E) x = b - r and b = N^T W v, the sum of w |v - N x|^2
-// is that of w |v|^2, less x . b, less x . r, less w x . E x.
+// The sum of w |v - N x|^2 at the last solution x, without a pass over the points. With (N^T W N +
+// w E) x = b - r and b = N^T W v it is sum w |v|^2 - x . b - x . r - w x . E x.
 double NestedSolve::SumOfSquares() {
   double sum = square_sum_ - weight_ * weight_sum_ * Energy();
   for (int c = 0; c < points_.channels; ++c) {
@@ -411,7 +417,7 @@ double NestedSolve::SumOfSquares() {
   return sum;
 }
 
-// Over the leaves of a level and all channels. The displacements must be there.
+// The sum of a form over the leaves of a level and all channels. Requires absolute_.
 double NestedSolve::SumOverLeaves(int level, const Matrix16& form) const {
   double sum = 0;
   ForEachLeafRun(level, [&](int i, int j, int count) {
@@ -426,14 +432,14 @@ double NestedSolve::SumOverLeaves(int level, const Matrix16& form) const {
   return sum;
 }
 
-// Of the solution, at weight 1.
+// The energy of the solution at weight 1.
 double NestedSolve::Energy() {
-  Absolute(solution_);
+  SumLevels(solution_);
   return Sum([&](int level) { return SumOverLeaves(level, levels_[level].energy); });
 }
 
 BendingSums NestedSolve::Bending() {
-  Absolute(solution_);
+  SumLevels(solution_);
   BendingSums sums{};
   for (int level = 0; level <= Finest(); ++level) {
     const PatchGrid& grid = (*space_)[level].layout.grid;
@@ -446,14 +452,14 @@ BendingSums NestedSolve::Bending() {
   return sums;
 }
 
-// Point by point where too few digits would be left.
+// Sums point by point if the difference of sums would keep too few digits.
 double NestedSolve::MeanSquare() {
-  constexpr double kEnough = 1e-10;
+  constexpr double kMinShare = 1e-10;  // of the sum of squares; six of sixteen digits are then left
   double sum = SumOfSquares();
-  if (!(sum > kEnough * square_sum_)) {
+  if (!(sum > kMinShare * square_sum_)) {
     sum = 0;
-    Absolute(solution_);
-    constexpr std::size_t kAtOnce = 1 << 14;
+    SumLevels(solution_);
+    constexpr std::size_t kAtOnce = 1 << 14;  // bounds the memory
     std::vector<NestedResidual> residuals;
     const std::size_t step = kAtOnce * used_.every;
     for (std::size_t begin = 0; begin < points_.size(); begin += step) {
@@ -503,11 +509,11 @@ void NestedSolve::SetSolution(const Packed& solution) {
 }
 
 const NestedValues& NestedSolve::Displacements() {
-  Absolute(solution_);
+  SumLevels(solution_);
   return absolute_;
 }
 
-// The displacements must be there.
+// Requires absolute_.
 void NestedSolve::AddResiduals(std::size_t begin, std::size_t end, const PointChoice& choice,
                                std::vector<NestedResidual>& residuals) const {
   LeafVertices vertices{};
@@ -522,8 +528,8 @@ void NestedSolve::AddResiduals(std::size_t begin, std::size_t end, const PointCh
               });
 }
 
-std::vector<NestedResidual> NestedSolve::ResidualsOf(const PointChoice& choice) {
-  Absolute(solution_);
+std::vector<NestedResidual> NestedSolve::Residuals(const PointChoice& choice) {
+  SumLevels(solution_);
   std::vector<NestedResidual> residuals;
   residuals.reserve(choice.Count(points_));
   AddResiduals(0, points_.size(), choice, residuals);

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The penalised least squares of a nested fit, by conjugate gradients over all levels at once.
+// The penalised least-squares solve of a nested fit, by conjugate gradients over all levels at
+// once.
 #pragma once
 
 #include <cstdint>
 #include <span>
 #include <vector>
 
-#include "fitting/nested/grid_sums.h"
+#include "fitting/nested/grid_values.h"
 #include "fitting/nested/leaf_sums.h"
 #include "fitting/nested/nested_points.h"
 #include "fitting/nested/nested_space.h"
@@ -16,60 +17,66 @@ namespace semblance {
 
 using NestedValues = std::vector<GridValues>;  // one per level
 
-// sum w |e|^2 / sum w + weight * (thin-plate energy / area), in displacements from the start; one
-// matrix for all channels. The matrix is kept by the level of the leaves that it stands for. Every
-// level's vertices are unknowns, each divided by its own diagonal: that is the multilevel
-// preconditioner of Bramble, Pasciak & Xu (1990), by way of Griebel's generating system (1994), so
-// that the number of steps does not grow with the vertices.
+// Minimises
+//
+//   sum w |e|^2 / sum w + weight * (thin-plate energy / area)
+//
+// in displacements from the start, with one matrix for all channels. The matrix is stored per
+// level, each part for the leaves of the level. The vertices of every level are unknowns, scaled by
+// their own diagonals. This is the multilevel preconditioner of Bramble, Pasciak & Xu (1990) as
+// Griebel's generating system (1994): the number of steps does not grow with the vertices.
+//
+// Order of calls: Begin (points, metric), then SetWeight, then Solve; SetWeight, SetMetric and
+// Solve may repeat. Enter alone suffices for SetSolution, Displacements and residuals.
 class NestedSolve {
  public:
-  // lengths_mm: what [0,1] stands for along u and v. All must outlive the solve.
+  // lengths_mm: lengths of [0,1] along u and v. `points` must outlive the solve.
   NestedSolve(const NestedPoints& points, const Vec2& lengths_mm);
 
-  // Takes the space as it is linked; it must outlive what is asked of it. What was solved for
-  // before is kept as the start of the next solve; the space must hold it.
+  // Adopts a linked space, which must outlive its use. The last solution stays as the start of the
+  // next solve; its levels must be levels of the space.
   void Enter(const NestedSpace& space);
-  // Enters it, and takes the points of a choice. With one more channel, a random sign per point,
-  // for the trace.
+  // Enters the space, and assembles the chosen points. An additional channel holds a random sign
+  // per point, for the trace.
   void Begin(const NestedSpace& space, PointChoice used,
              const BendingMetric& metric = BendingMetric::Identity());
-  // The weight of the thin-plate energy, mm^2 per energy.
+  // Sets the weight of the thin-plate energy, mm^2 per energy.
   void SetWeight(double weight);
-  // In which lengths bending is measured instead of those since the beginning.
+  // Changes the metric of bending.
   void SetMetric(const BendingMetric& metric);
   const BendingMetric& metric() const { return metric_; }
-  // Until what is left to gain is below `least_gain` of the sum of w |e|^2 (0: far below rounding).
+  // Solves until the remaining decrease of the sum of w |e|^2 is below `least_gain` (0: round-off).
   // Returns the number of steps.
   int Solve(double least_gain);
 
-  // The mean of w |e|^2 along one axis, of the points that were taken, at the last solution.
+  // The mean of w |e|^2 along one axis over the chosen points, at the last solution.
   double MeanSquare();
   // The trace of the influence matrix at the last solution, by one probe (Hutchinson 1990).
   double Trace() const;
-  BendingSums Bending();  // of the last solution, over all channels but the probe
+  BendingSums Bending();  // of the last solution, summed over the channels without the probe
   double WeightSum() const { return weight_sum_; }
-  // The diagonals' sums over those of the energy at weight 1: where points and energy balance.
+  // The weight at which points and energy balance: the ratio of the sums of their diagonals.
   double EvenWeight() const { return even_weight_; }
 
-  // The vertices of the space's runs, level by level; for the same space again.
+  // A solution as the values in the space's runs, level by level. It fits the same space only.
   using Packed = std::vector<double>;
   Packed Solution() const;
   void SetSolution(const Packed& solution);
 
-  // The absolute displacements of every level's vertices, halos filled; until the next call of
-  // anything else.
+  // The total displacements of every level's vertices, with filled halos. Valid until the next
+  // non-const call.
   const NestedValues& Displacements();
-  // Of the points of a choice, in their order.
-  std::vector<NestedResidual> ResidualsOf(const PointChoice& choice);
+  // The residuals of the chosen points, in their order.
+  std::vector<NestedResidual> Residuals(const PointChoice& choice);
 
  private:
   struct LevelSystem {
-    StencilMatrix matrix;  // of the leaves; empty where there are none
-    std::vector<char> leaves;
-    Matrix16 energy;  // of a patch, at weight 1
+    StencilMatrix matrix;      // of the leaves; empty if there are none
+    std::vector<char> leaves;  // per patch
+    Matrix16 energy;           // of a patch, at weight 1
     GridValues data_diagonal, energy_diagonal, inverse;
   };
-  // What a channel has to gain, and what is not worth a step.
+  // The remaining gain of a channel, and the gain that ends its iteration.
   struct ChannelGain {
     double left = 0, enough = 0;
     bool IsMore() const { return left > enough; }
@@ -85,7 +92,7 @@ class NestedSolve {
   void AddResiduals(std::size_t begin, std::size_t end, const PointChoice& choice,
                     std::vector<NestedResidual>& residuals) const;
   void AddPoints(std::vector<std::vector<double>>& data_shares);
-  Matrix16 EnergyOf(const PatchGrid& grid) const;
+  Matrix16 PatchEnergy(const PatchGrid& grid) const;
   template <class Visit>
   void ForEachPatch(int level, const Visit& visit) const;
   double MakeDataDiagonals(std::vector<std::vector<double>> shares);
@@ -97,10 +104,10 @@ class NestedSolve {
   void Invert();
   double SumOverLeaves(int level, const Matrix16& form) const;
   void Multiply(const NestedValues& x, NestedValues& product);
-  void Absolute(const NestedValues& x);
+  void SumLevels(const NestedValues& x);
   double Energy();
   double SumOfSquares();
-  GridStep StepOf(int level, int channel);
+  GridStep MakeStep(int level, int channel);
   ChannelGain Begin(int channel, double least_gain);
   void Advance(int channel, ChannelGain& gain);
   template <class Part>
@@ -116,13 +123,13 @@ class NestedSolve {
   double weight_ = 0, weight_sum_ = 0, square_sum_ = 0, even_weight_ = kNaN;
 };
 
-// What the last solution of a solve leaves of its points, some of them at a time: all of them would
-// need half as much memory as the points. Until the solve is asked for anything else.
+// The residuals of the last solution for ranges of points; all residuals at once would take half
+// the memory of the points. Valid until the next non-const call of the solve.
 class NestedResiduals {
  public:
   explicit NestedResiduals(NestedSolve& solve) : solve_(solve) { solve_.Displacements(); }
 
-  // Of points begin .. end - 1; until the next call.
+  // The residuals of points begin .. end - 1. Valid until the next call.
   std::span<const NestedResidual> Of(std::size_t begin, std::size_t end);
 
  private:

@@ -41,13 +41,13 @@ int NestedSpace::Overlay(int level, int i, int j) {
   return added;
 }
 
-// Each patch of the level before with a child that is split or has an active vertex.
+// Marks each patch of the coarser level that has a child which is split or has an active vertex.
 void NestedSpace::SplitAbove(int level) {
   const NestedLevel& l = levels_[level];
   const PatchGrid& grid = l.layout.grid;
   const int columns = grid.Columns();
   std::vector<char>& split = levels_[level - 1].split;
-  std::vector<char> across(grid.patches_u);  // of a row of vertices: patches that one belongs to
+  std::vector<char> across(grid.patches_u);  // per patch: an active vertex of the row reaches it
   for (int row = 0; row < grid.Rows(); ++row) {
     const char* const active = l.active.data() + l.layout.At(0, row);
     for (int i = 0; i < grid.patches_u; ++i) {
@@ -56,7 +56,7 @@ void NestedSpace::SplitAbove(int level) {
         across[i] |= active[i + a < columns ? i + a : (i + a) % columns];
       }
     }
-    for (const int j : RowsOfPatches(grid, row)) {
+    for (const int j : PatchRowsAround(grid, row)) {
       if (j < 0) {
         continue;
       }
@@ -76,7 +76,7 @@ void NestedSpace::SplitAbove(int level) {
 void NestedSpace::Link() {
   for (NestedLevel& l : levels_) {
     l.split.assign(l.layout.Patches(), 0);
-    l.there.assign(l.layout.Patches(), &l == &levels_.front() ? 1 : 0);
+    l.present.assign(l.layout.Patches(), &l == &levels_.front() ? 1 : 0);
   }
   for (int level = finest(); level >= 1; --level) {
     SplitAbove(level);
@@ -85,12 +85,12 @@ void NestedSpace::Link() {
     NestedLevel& l = levels_[level];
     for (int j = 0; level > 0 && j < l.layout.grid.patches_v; ++j) {
       for (int i = 0; i < l.layout.grid.patches_u; ++i) {
-        l.there[l.layout.Patch(i, j)] =
+        l.present[l.layout.Patch(i, j)] =
             levels_[level - 1].split[levels_[level - 1].layout.Patch(i / 2, j / 2)];
       }
     }
-    l.leaves = l.there != l.split;
-    l.runs = RunsAround(l.layout, l.there);
+    l.leaves = l.present != l.split;
+    l.runs = RunsAround(l.layout, l.present);
   }
   vertices_ = CountVertices();
 }
@@ -110,9 +110,9 @@ int NestedSpace::FinestWhole() const {
 
 std::vector<char> NestedSpace::Leaves(int level) const {
   const NestedLevel& l = levels_[level];
-  std::vector<char> leaves(l.there.size());
+  std::vector<char> leaves(l.present.size());
   for (std::size_t p = 0; p < leaves.size(); ++p) {
-    leaves[p] = l.there[p] != 0 && l.split[p] == 0 ? 1 : 0;
+    leaves[p] = l.present[p] != 0 && l.split[p] == 0 ? 1 : 0;
   }
   return leaves;
 }
@@ -129,7 +129,7 @@ int NestedSpace::LeafLevel(double x, double y) const {
   }
 }
 
-// Vertex i of a level is a sum of 2 i - 3 .. 2 i + 1 of the next.
+// The B-spline of vertex i is a sum of those of vertices 2 i - 3 .. 2 i + 1 of the next level.
 bool NestedSpace::IsCovered(int level, int i, int j) const {
   if (level == finest()) {
     return false;

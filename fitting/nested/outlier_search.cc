@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/nested/outlier_search.h"
-#include "surfaces/base/quantile.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,27 +7,37 @@
 #include <numeric>
 #include <utility>
 
+#include "surfaces/base/quantile.h"
+
 namespace semblance {
 namespace {
 
-constexpr std::ptrdiff_t kBlock = 24;  // points that share a median; half as many more on each side
-constexpr int kNearest = 8, kWindow = 20, kPasses = 4;
-constexpr double kFar = 6, kFarther = 10;
-constexpr double kTail = 0.2;  // of those that are farther
-constexpr double kAlike = 0.5;
-constexpr double kTells = 4;      // standard deviations of a point that it can tell from none
-constexpr double kMostVotes = 4;  // of a point, in those of most
+// The constants were chosen on the point sets of docs/fit.md, "How good it is".
 
-// A point stands on a sheet if so many of those nearest to it are within a part of its own distance
-// from the surface of it.
+// Points that share a median; half as many more on each side enter it. Larger blocks give steadier
+// medians, smaller ones follow detail.
+constexpr std::ptrdiff_t kBlock = 24;
+constexpr int kNearest = 8;  // neighbours that confirm a residual
+constexpr int kWindow = 20;  // points on each side of the curve that are searched for neighbours
+constexpr int kPasses = 4;   // each pass drops the last pass's outliers from the medians
+constexpr double kOutlierSds = 6;   // standard deviations; fewer lose detail, more keep errors
+constexpr double kGrossSds = 10;    // standard deviations; separates gross errors from a tail
+constexpr double kTailShare = 0.2;  // tail's size relative to the gross errors
+constexpr double kSimilar = 0.5;  // largest difference of similar residuals, of the point's offset
+constexpr double kMinOffset = 4;  // offset that a neighbour can confirm, in its standard deviations
+constexpr double kMaxWeight = 4;  // of a point in a weighted median, in median weights
+
+// A point stands on a sheet if at least `least` of the `nearest` points around it are closer to it
+// than `within` times its distance from the surface.
 struct SheetRule {
   int nearest, least;
   double within;
 };
-// Of gross errors one in fifty does by chance by the first, and many do by the second.
-constexpr SheetRule kSurely = {.nearest = 8, .least = 2, .within = 0.1},
-                    kPerhaps = {.nearest = 20, .least = 2, .within = 0.2};
-constexpr double kOnSheets = 0.1;  // of the outliers: there are steps
+// By chance one gross error in fifty meets the strict rule, and many meet the loose rule.
+constexpr SheetRule kStrict = {.nearest = 8, .least = 2, .within = 0.1},
+                    kLoose = {.nearest = 20, .least = 2, .within = 0.2};
+// Share of the outliers on sheets, beyond chance, that proves steps.
+constexpr double kMinStepShare = 0.1;
 
 class OutlierSearch {
  public:
@@ -43,8 +52,8 @@ class OutlierSearch {
 
   std::ptrdiff_t count() const { return count_; }
 
-  // What follows from `before`, whose last pass has given `found` but where `stale` says that
-  // `before` has changed in a block or next to it. Returns the blocks that it changed.
+  // Updates `found` from the flags `before`, in the blocks that are `stale` because `before` has
+  // changed in or next to them. Returns the blocks whose flags changed.
   std::vector<char> Pass(const std::vector<char>& before, const std::vector<char>& stale,
                          std::vector<char>& found) {
     before_ = &before;
@@ -63,8 +72,7 @@ class OutlierSearch {
     return changed;
   }
 
-  // Of the outliers that were found those that perhaps stand on a sheet, if more than chance does
-  // surely do.
+  // The outliers that meet the loose rule, if enough of them meet the strict rule.
   std::vector<std::ptrdiff_t> OnSheets(const std::vector<char>& found) {
     before_ = &found;
     std::vector<std::ptrdiff_t> outliers;
@@ -73,136 +81,137 @@ class OutlierSearch {
         outliers.push_back(k);
       }
     }
-    if (outliers.empty() || ShareOnSheets(outliers) <= kOnSheets) {
+    if (outliers.empty() || StepShare(outliers) <= kMinStepShare) {
       return {};
     }
     std::erase_if(outliers, [&](std::ptrdiff_t k) {
-      LookAround(k);
-      return !IsOnSheet(k, Left(k), Off(k), kPerhaps);
+      MeasureAround(k);
+      return !IsOnSheet(k, ResidualVector(k), Offset(k), kLoose);
     });
     return outliers;
   }
 
  private:
-  static constexpr std::ptrdiff_t kBlocksAtOnce = 512;
+  static constexpr std::ptrdiff_t kBlocksAtOnce = 512;  // residuals per read; bounds the memory
 
-  // The residuals around some blocks.
+  // Reads the residuals of points begin .. end - 1 and of the windows around them.
   void Read(std::ptrdiff_t begin, std::ptrdiff_t end) {
     first_ = std::max<std::ptrdiff_t>(begin - kWindow, 0);
     residuals_ = all_(first_, std::min(end + kWindow, count_));
   }
 
-  const NestedResidual& ResidualOf(std::ptrdiff_t k) const { return residuals_[k - first_]; }
+  const NestedResidual& Residual(std::ptrdiff_t k) const { return residuals_[k - first_]; }
 
-  // The points that share a block's median.
-  static std::ptrdiff_t Around(std::ptrdiff_t begin) {
+  // The region around a block, whose points share a median.
+  static std::ptrdiff_t RegionBegin(std::ptrdiff_t begin) {
     return std::max<std::ptrdiff_t>(begin - kBlock / 2, 0);
   }
-  std::ptrdiff_t Behind(std::ptrdiff_t end) const { return std::min(end + kBlock / 2, count_); }
+  std::ptrdiff_t RegionEnd(std::ptrdiff_t end) const { return std::min(end + kBlock / 2, count_); }
 
-  void LookAround(std::ptrdiff_t k) {
+  void MeasureAround(std::ptrdiff_t k) {
     const std::ptrdiff_t begin = k - k % kBlock, end = std::min(begin + kBlock, count_);
     Read(begin, end);
-    Look(Around(begin), Behind(end));
+    MeasureRegion(RegionBegin(begin), RegionEnd(end));
   }
 
-  // Of the outliers (some of many) less of those that would where others are, as far off as they
-  // are here: gross errors agree by chance, the more so if all are off by the same, and one place
-  // is then as good as another.
-  double ShareOnSheets(const std::vector<std::ptrdiff_t>& outliers) {
-    constexpr std::size_t kAsked = 300;
-    const std::size_t each = std::max<std::size_t>(outliers.size() / kAsked, 1);
+  // The share of the outliers (of a sample) that meet the strict rule, less the share that does by
+  // chance. For the latter each outlier's residual is tried at the place of another outlier: gross
+  // errors that agree by chance, for example because all have the same offset, agree there too.
+  double StepShare(const std::vector<std::ptrdiff_t>& outliers) {
+    constexpr std::size_t kMaxTested = 300;  // the share's standard error is then below 2 %
+    const std::size_t each = std::max<std::size_t>(outliers.size() / kMaxTested, 1);
     int asked = 0, on_sheets = 0;
     for (std::size_t n = 0; n < outliers.size(); n += each) {
       const std::ptrdiff_t here = outliers[n],
                            there = outliers[(n + outliers.size() / 2) % outliers.size()];
-      LookAround(here);
-      const Vec3 left = Left(here);
-      const double off = Off(here);
-      on_sheets += IsOnSheet(here, left, off, kSurely) ? 1 : 0;
-      LookAround(there);
-      on_sheets -= IsOnSheet(there, left, off, kSurely) ? 1 : 0;
+      MeasureAround(here);
+      const Vec3 left = ResidualVector(here);
+      const double off = Offset(here);
+      on_sheets += IsOnSheet(here, left, off, kStrict) ? 1 : 0;
+      MeasureAround(there);
+      on_sheets -= IsOnSheet(there, left, off, kStrict) ? 1 : 0;
       ++asked;
     }
     return static_cast<double>(on_sheets) / asked;
   }
 
-  // Whether it changes anything.
+  // Updates the flags of a block. Returns whether any changed.
   bool PassBlock(std::ptrdiff_t begin, std::vector<char>& found) {
-    const std::ptrdiff_t end = std::min(begin + kBlock, count_), around = Around(begin),
-                         behind = Behind(end);
-    const bool calm = points_.weight.empty() && IsCalm(around, behind);
-    if (!calm) {
-      Look(around, behind);
+    const std::ptrdiff_t end = std::min(begin + kBlock, count_), around = RegionBegin(begin),
+                         behind = RegionEnd(end);
+    const bool smooth = points_.weight.empty() && IsSmoothRegion(around, behind);
+    if (!smooth) {
+      MeasureRegion(around, behind);
     }
     bool changed = false;
     for (std::ptrdiff_t k = begin; k < end; ++k) {
-      const char is = !calm && IsFar(k) && !HasCompany(k) ? 1 : 0;
+      const char is = !smooth && IsFar(k) && !HasSimilarNeighbours(k) ? 1 : 0;
       changed = changed || is != found[k];
       found[k] = is;
     }
     return changed;
   }
 
-  // All, if too few have a vote.
-  void FindVoters(std::ptrdiff_t begin, std::ptrdiff_t end) {
-    voters_.clear();
+  // The region's points that are not flagged, or all of them if too few are not.
+  void FindMedianPoints(std::ptrdiff_t begin, std::ptrdiff_t end) {
+    median_points_.clear();
     for (std::ptrdiff_t k = begin; k < end; ++k) {
       if ((*before_)[k] == 0) {
-        voters_.push_back(k);
+        median_points_.push_back(k);
       }
     }
-    if (std::ssize(voters_) < kBlock / 3) {
-      voters_.resize(end - begin);
-      std::iota(voters_.begin(), voters_.end(), begin);
+    if (std::ssize(median_points_) < kBlock / 3) {
+      median_points_.resize(end - begin);
+      std::iota(median_points_.begin(), median_points_.end(), begin);
     }
   }
 
-  // One point, one vote.
+  // The median over median_points_.
   template <class Value>
-  double MedianOf(const Value& value) {
+  double Median(const Value& value) {
     values_.clear();
-    for (const std::ptrdiff_t k : voters_) {
+    for (const std::ptrdiff_t k : median_points_) {
       values_.push_back(value(k));
     }
     return UpperMedian(values_);
   }
 
-  // The same value where all are equally sure.
+  // The median over median_points_, weighted by 1 / sigma. It equals Median for equal weights.
   template <class Value>
-  double SureMedianOf(const Value& value) {
+  double WeightedMedian(const Value& value) {
     if (points_.weight.empty()) {
-      return MedianOf(value);
+      return Median(value);
     }
-    voices_.clear();
+    weighted_values_.clear();
     double left = 0;
-    for (const std::ptrdiff_t k : voters_) {
-      voices_.emplace_back(value(k), std::min(ScaleOf(k), most_votes_));
-      left += voices_.back().second / 2;
+    for (const std::ptrdiff_t k : median_points_) {
+      weighted_values_.emplace_back(value(k), std::min(Scale(k), max_weight_));
+      left += weighted_values_.back().second / 2;
     }
-    std::sort(voices_.begin(), voices_.end());
-    auto voice = voices_.begin();
-    for (; voice + 1 != voices_.end() && left >= voice->second; ++voice) {
-      left -= voice->second;
+    std::sort(weighted_values_.begin(), weighted_values_.end());
+    auto entry = weighted_values_.begin();
+    for (; entry + 1 != weighted_values_.end() && left >= entry->second; ++entry) {
+      left -= entry->second;
     }
-    return voice->first;
+    return entry->first;
   }
 
-  double ScaleOf(std::ptrdiff_t k) const { return points_.Scale(k * every_); }
+  double Scale(std::ptrdiff_t k) const { return points_.Scale(k * every_); }
 
-  // Whether none can be far: a median is no farther from the mean than the standard deviation.
-  bool IsCalm(std::ptrdiff_t begin, std::ptrdiff_t end) const {
+  // Returns whether no point of the region can be an outlier: a median is at most one standard
+  // deviation away from the mean, so no offset can exceed the limit. This saves the medians.
+  bool IsSmoothRegion(std::ptrdiff_t begin, std::ptrdiff_t end) const {
     std::array<double, 3> sum{}, squares{};
     double largest = 0;
-    char voteless = 0;
+    char flagged = 0;
     for (std::ptrdiff_t k = begin; k < end; ++k) {
-      const std::array<double, 3>& e = ResidualOf(k).along;
-      voteless = static_cast<char>(voteless | (*before_)[k]);
+      const std::array<double, 3>& e = Residual(k).along;
+      flagged = static_cast<char>(flagged | (*before_)[k]);
       for (int c = 0; c < 3; ++c) {
         sum[c] += e[c];
         squares[c] += e[c] * e[c];
       }
-      largest = std::max(largest, ResidualOf(k).Square());
+      largest = std::max(largest, Residual(k).Square());
     }
     const auto count = static_cast<double>(end - begin);
     double middle = 0;
@@ -212,53 +221,54 @@ class OutlierSearch {
                        std::abs(mean) + std::sqrt(std::max(squares[c] / count - mean * mean, 0.0));
       middle += reach * reach;
     }
-    return voteless == 0 && std::sqrt(largest) + std::sqrt(middle) <
-                                far_ * std::max(least_.noise_mm, least_.rounding_mm);
+    return flagged == 0 && std::sqrt(largest) + std::sqrt(middle) <
+                               far_ * std::max(least_.noise_mm, least_.rounding_mm);
   }
 
-  void Look(std::ptrdiff_t begin, std::ptrdiff_t end) {
-    FindVoters(begin, end);
+  void MeasureRegion(std::ptrdiff_t begin, std::ptrdiff_t end) {
+    FindMedianPoints(begin, end);
     const bool weighted = !points_.weight.empty();
     if (weighted) {
-      most_votes_ = kMostVotes * MedianOf([&](std::ptrdiff_t k) { return ScaleOf(k); });
+      max_weight_ = kMaxWeight * Median([&](std::ptrdiff_t k) { return Scale(k); });
     }
     for (int c = 0; c < points_.channels; ++c) {
-      middle_[c] = SureMedianOf([&](std::ptrdiff_t k) { return ResidualOf(k).along[c]; });
+      middle_[c] = WeightedMedian([&](std::ptrdiff_t k) { return Residual(k).along[c]; });
     }
     const double sd_of_median = kSdOfMedian[points_.channels];
-    spread_mm_ = sd_of_median * SureMedianOf([&](std::ptrdiff_t k) { return Off(k); });
+    spread_mm_ = sd_of_median * WeightedMedian([&](std::ptrdiff_t k) { return Offset(k); });
     const double noise_mm =
-        weighted ? sd_of_median * MedianOf([&](std::ptrdiff_t k) { return ScaleOf(k) * Off(k); })
+        weighted ? sd_of_median * Median([&](std::ptrdiff_t k) { return Scale(k) * Offset(k); })
                  : spread_mm_;
     noise_mm_ = std::max(noise_mm, least_.noise_mm);
   }
 
-  double NoiseOf(std::ptrdiff_t k) const { return noise_mm_ / ScaleOf(k); }
+  double Noise(std::ptrdiff_t k) const { return noise_mm_ / Scale(k); }
 
   bool IsFar(std::ptrdiff_t k) const {
-    return Off(k) > far_ * std::max({spread_mm_, NoiseOf(k), least_.rounding_mm});
+    return Offset(k) > far_ * std::max({spread_mm_, Noise(k), least_.rounding_mm});
   }
 
-  double Off(std::ptrdiff_t k) const {
+  double Offset(std::ptrdiff_t k) const {
     double square = 0;
     for (int c = 0; c < points_.channels; ++c) {
-      const double off = ResidualOf(k).along[c] - middle_[c];
+      const double off = Residual(k).along[c] - middle_[c];
       square += off * off;
     }
     return std::sqrt(square);
   }
 
-  // Whether b is off as a is.
-  bool Alike(std::ptrdiff_t a, std::ptrdiff_t b) const {
+  // Returns whether b has a residual similar to a's.
+  bool AreSimilar(std::ptrdiff_t a, std::ptrdiff_t b) const {
     double apart = 0;
     for (int c = 0; c < points_.channels; ++c) {
-      const double d = ResidualOf(a).along[c] - ResidualOf(b).along[c];
+      const double d = Residual(a).along[c] - Residual(b).along[c];
       apart += d * d;
     }
-    return std::sqrt(apart) < kAlike * Off(a);
+    return std::sqrt(apart) < kSimilar * Offset(a);
   }
 
-  // Of the points that stand next to it along the curve those nearest to it, but for some.
+  // The nearest points to k in (u,v) among its window along the curve, if `counts` accepts them; at
+  // most `most`.
   template <class Counts>
   std::span<const std::pair<double, std::ptrdiff_t>> Nearest(std::ptrdiff_t k, int most,
                                                              const Counts& counts) {
@@ -276,24 +286,26 @@ class OutlierSearch {
     return std::span(near_).first(nearest);
   }
 
-  // Among those that can tell.
-  bool HasCompany(std::ptrdiff_t k) {
-    const double off = Off(k);
+  // Returns whether at least half of the nearest points, among those that can confirm k's offset,
+  // have a similar residual.
+  bool HasSimilarNeighbours(std::ptrdiff_t k) {
+    const double off = Offset(k);
     const auto nearest =
-        Nearest(k, kNearest, [&](std::ptrdiff_t q) { return off > kTells * NoiseOf(q); });
-    const auto alike = std::ranges::count_if(
-        nearest, [&](const auto& n) { return (*before_)[n.second] == 0 && Alike(k, n.second); });
+        Nearest(k, kNearest, [&](std::ptrdiff_t q) { return off > kMinOffset * Noise(q); });
+    const auto alike = std::ranges::count_if(nearest, [&](const auto& n) {
+      return (*before_)[n.second] == 0 && AreSimilar(k, n.second);
+    });
     return 2 * alike >= std::ssize(nearest);
   }
 
-  Vec3 Left(std::ptrdiff_t k) const {
-    const std::array<double, 3>& e = ResidualOf(k).along;
+  Vec3 ResidualVector(std::ptrdiff_t k) const {
+    const std::array<double, 3>& e = Residual(k).along;
     return {e[0], e[1], e[2]};
   }
 
-  // Whether some of those nearest to point k stand where it would, were `left` left of it.
+  // Returns whether point k, moved so that its residual is `left`, stands on a sheet by the rule.
   bool IsOnSheet(std::ptrdiff_t k, const Vec3& left, double off, const SheetRule& rule) {
-    const Vec3 place = points_.value[k * every_] - Left(k) + left;
+    const Vec3 place = points_.value[k * every_] - ResidualVector(k) + left;
     const auto nearest = Nearest(k, rule.nearest, [](std::ptrdiff_t) { return true; });
     return std::ranges::count_if(nearest, [&](const auto& n) {
              return (points_.value[n.second * every_] - place).norm() < rule.within * off;
@@ -304,27 +316,23 @@ class OutlierSearch {
   std::size_t every_;
   std::ptrdiff_t count_;
   const ResidualsBetween& all_;
-  std::span<const NestedResidual> residuals_;  // from `first_` on
+  std::span<const NestedResidual> residuals_;  // of points first_ ..
   std::ptrdiff_t first_ = 0;
   LeastSpread least_;
-  double far_;  // standard deviations
+  double far_;  // limit of the offset, in standard deviations
   const std::vector<char>* before_ = nullptr;
-  std::array<double, 3> middle_{};
-  double spread_mm_ = 0;  // of the points around, whatever their weights
-  double noise_mm_ = 0;   // the same of a point of mean weight, if all of it is noise
-  double most_votes_ = 0;
-  std::vector<std::ptrdiff_t> voters_;
+  std::array<double, 3> middle_{};  // median residual of the region
+  double spread_mm_ = 0;            // standard deviation of the region, by a weighted median
+  double noise_mm_ = 0;             // of a point of mean weight, if the spread is noise
+  double max_weight_ = 0;           // in the weighted medians
+  std::vector<std::ptrdiff_t> median_points_;
   std::vector<double> values_;
-  std::vector<std::pair<double, double>> voices_;  // values, and how much they count
+  std::vector<std::pair<double, double>> weighted_values_;  // value and weight
   std::vector<std::pair<double, std::ptrdiff_t>> near_;
 };
 
-}  // namespace
-
-namespace {
-
-// Of each block, whether it or one beside it has changed.
-std::vector<char> BesideThose(const std::vector<char>& changed) {
+// Marks each block that has changed, or that is next to one.
+std::vector<char> WithNeighbours(const std::vector<char>& changed) {
   std::vector<char> beside = changed;
   for (std::size_t b = 0; b < changed.size(); ++b) {
     const bool is_next =
@@ -334,7 +342,7 @@ std::vector<char> BesideThose(const std::vector<char>& changed) {
   return beside;
 }
 
-// A pass looks again only where what the one before has found is news.
+// Repeats passes until no flag changes. A pass updates only the blocks that the last pass affects.
 int Search(OutlierSearch search, std::size_t every, std::vector<char>& outlier) {
   static_assert(kWindow < kBlock);
   std::vector<char> found(search.count());
@@ -344,7 +352,7 @@ int Search(OutlierSearch search, std::size_t every, std::vector<char>& outlier) 
   std::vector<char> stale((found.size() + kBlock - 1) / kBlock, 1);
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::vector<char> before = found;
-    stale = BesideThose(search.Pass(before, stale, found));
+    stale = WithNeighbours(search.Pass(before, stale, found));
     if (before == found) {
       break;
     }
@@ -355,7 +363,7 @@ int Search(OutlierSearch search, std::size_t every, std::vector<char>& outlier) 
   return static_cast<int>(std::count(found.begin(), found.end(), 1));
 }
 
-std::vector<std::uint32_t> IndicesOf(const std::vector<char>& outlier) {
+std::vector<std::uint32_t> FlaggedIndices(const std::vector<char>& outlier) {
   std::vector<std::uint32_t> indices;
   for (std::uint32_t k = 0; k < outlier.size(); ++k) {
     if (outlier[k] != 0) {
@@ -365,7 +373,7 @@ std::vector<std::uint32_t> IndicesOf(const std::vector<char>& outlier) {
   return indices;
 }
 
-void Become(const std::vector<std::uint32_t>& indices, std::vector<char>& outlier) {
+void SetFlags(const std::vector<std::uint32_t>& indices, std::vector<char>& outlier) {
   std::ranges::fill(outlier, 0);
   for (const std::uint32_t k : indices) {
     outlier[k] = 1;
@@ -374,28 +382,29 @@ void Become(const std::vector<std::uint32_t>& indices, std::vector<char>& outlie
 
 }  // namespace
 
-// Outliers are few, and points may be ten million: their indices take less than one more flag each.
+// Keeps indices of outliers instead of copies of the flags: outliers are few, and points may be ten
+// million.
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
                  const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier) {
-  const std::vector<std::uint32_t> before = IndicesOf(outlier);
-  const int count = Search({points, every, residuals, least, kFar}, every, outlier);
-  if (count == 0 || tail == OutlierTail::kGoes) {
+  const std::vector<std::uint32_t> before = FlaggedIndices(outlier);
+  const int count = Search({points, every, residuals, least, kOutlierSds}, every, outlier);
+  if (count == 0 || tail == OutlierTail::kReject) {
     return count;
   }
-  const std::vector<std::uint32_t> far = IndicesOf(outlier);
-  Become(before, outlier);
-  const int fewer = Search({points, every, residuals, least, kFarther}, every, outlier);
-  if (count - fewer > kTail * fewer) {
+  const std::vector<std::uint32_t> far = FlaggedIndices(outlier);
+  SetFlags(before, outlier);
+  const int fewer = Search({points, every, residuals, least, kGrossSds}, every, outlier);
+  if (count - fewer > kTailShare * fewer) {
     return fewer;
   }
-  Become(far, outlier);
+  SetFlags(far, outlier);
   return count;
 }
 
-int SpareSheets(const NestedPoints& points, const ResidualsBetween& residuals,
-                const LeastSpread& least, std::vector<char>& outlier) {
+int ReinstateStepPoints(const NestedPoints& points, const ResidualsBetween& residuals,
+                        const LeastSpread& least, std::vector<char>& outlier) {
   const std::vector<std::ptrdiff_t> on_sheets =
-      OutlierSearch(points, /*every=*/1, residuals, least, kFar).OnSheets(outlier);
+      OutlierSearch(points, /*every=*/1, residuals, least, kOutlierSds).OnSheets(outlier);
   for (const std::ptrdiff_t k : on_sheets) {
     outlier[k] = 0;
   }

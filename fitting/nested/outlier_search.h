@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Outliers: points that disagree with their neighbours.
+// Outliers: points whose residuals disagree with those of their neighbours.
 #pragma once
 
 #include <array>
@@ -12,46 +12,54 @@
 
 namespace semblance {
 
-// Standard deviation along one axis over the median of the distance, for normal errors along 1, 2
-// and 3 axes.
+// The standard deviation along one axis divided by the median of the distance, for normal errors
+// along 1, 2 and 3 axes (index 1 .. 3).
 inline constexpr std::array<double, 4> kSdOfMedian = {1, 1.4826, 0.8493, 0.6501};
 
-// Residuals begin .. end - 1 of the points that are looked at, in their order; until the next call.
+// Returns residuals begin .. end - 1 of the sampled points, in their order. Valid until the next
+// call.
 using ResidualsBetween =
     std::function<std::span<const NestedResidual>(std::size_t begin, std::size_t end)>;
 
-// Standard deviations along one axis below which nothing is an outlier.
+// Lower bounds of the standard deviation along one axis, so that tiny residuals are never outliers.
 struct LeastSpread {
-  double noise_mm = 0;     // of a point of mean weight; of others by their weight
-  double rounding_mm = 0;  // of every point
+  double noise_mm = 0;     // for a point of mean weight; scaled by 1 / sqrt(weight) for others
+  double rounding_mm = 0;  // for every point
 };
 
-// What becomes of points that are only somewhat too far, where they are many.
-enum class OutlierTail { kStays, kGoes };
+// The treatment of points between 6 and 10 standard deviations if they are many.
+enum class OutlierTail { kKeep, kReject };
 
-// Says of one point in `every` whether it is an outlier: its residual, less the median of the
-// points around it, is more than six standard deviations of theirs (by their median, so that up to
-// a third of them may be outliers too) and of `least`, and fewer than half of the eight
-// points nearest to it have one like it. So detail that the surface does not follow yet, which
-// neighbours share, is none, and the width falls with the residuals as the surface gets finer.
-// Gross errors are a kind of their own, most of them much farther off. Where those between six and
-// ten standard deviations are more than a fifth of those beyond, distances have a tail, as where a
-// surface is too coarse for edges and steps; then only those beyond ten are outliers if the tail
-// stays.
-// With weights the standard deviation is that of the points around it times its own sigma over
-// theirs, or theirs as it is, whichever is more: the one is what noise would do, the other what
-// detail does. Points that are surer count more for the median, at most four times as much as most;
-// and those whose own noise hides what is asked have no say.
-// outlier: per point; what stands there when it begins has no vote. Returns how many there are.
+// Decides for one point in `every` whether it is an outlier. A point is an outlier if
+//   1. its offset (the residual less the median of the points around it) exceeds six standard
+//      deviations, and
+//   2. fewer than half of the eight points nearest to it have a similar residual. The standard
+//      deviation is that of the points around it, by their median, so that up to a third of them
+//      may be outliers; it is at least `least`. By the second condition, detail that the surface
+//      does not follow yet is not an outlier, because neighbours share it. The limit falls with
+//      the residuals as the surface becomes finer.
+//
+// Tail. Gross errors mostly lie far beyond ten standard deviations. If more than a fifth as many
+// points lie between six and ten as beyond ten, the offsets have a tail, as at edges and steps that
+// the surface is too coarse for; with OutlierTail::kKeep only points beyond ten are then outliers.
+//
+// Weights. A point's standard deviation is the larger of two: that of the points around it, and
+// their noise scaled by the ratio of its own sigma to theirs. The first covers detail, the second
+// noise. In the weighted medians a point counts by 1 / sigma, at most four times as much as the
+// median point. A neighbour whose own noise hides an offset of this size is not used.
+//
+// outlier: one flag per point. Points that are flagged at the start do not enter the medians.
+// Returns the number of outliers among the sampled points.
 int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsBetween& residuals,
                  const LeastSpread& least, OutlierTail tail, std::vector<char>& outlier);
 
-// At a step, where one sheet of points goes behind another, a smooth surface is far from points of
-// both, beside which others stand. Where more than a tenth of the outliers that FindOutliers has
-// found, beyond what chance does, have two of the eight points nearest to them within a tenth of
-// their distance from the surface, those with two of twenty within a fifth become none. Returns how
-// many.
-int SpareSheets(const NestedPoints& points, const ResidualsBetween& residuals,
-                const LeastSpread& least, std::vector<char>& outlier);
+// Clears the flags of outliers that stand at a step. If one sheet of points goes behind another,
+// a smooth surface is far from the points of both, and other points of their sheet stand next to
+// them. If more than a tenth of the outliers (beyond the number expected by chance) meet a strict
+// rule, two of the eight nearest points within a tenth of their distance from the surface, then all
+// outliers that meet a loose rule, two of twenty within a fifth, are no outliers any more. Returns
+// their number.
+int ReinstateStepPoints(const NestedPoints& points, const ResidualsBetween& residuals,
+                        const LeastSpread& least, std::vector<char>& outlier);
 
 }  // namespace semblance

@@ -13,9 +13,9 @@ constexpr int kBlock = GridLayout::kBlock;
 
 SEMBLANCE_INLINE void AddEight(const Wider& n, double* to) { PutEight(EightAt(to) + n, to); }
 
-// A run's diagonals, and the channels' numbers from its first vertex on.
+// A run's diagonals, and the channels' values from its first vertex on.
 struct RunProduct {
-  const double* entries;  // of the first diagonal at the first vertex
+  const double* entries;  // first diagonal's entry at the first vertex
   std::ptrdiff_t length;  // from diagonal to diagonal
   std::ptrdiff_t stride;  // from row to row
   int blocks;
@@ -23,7 +23,7 @@ struct RunProduct {
   double* y[4];
 };
 
-// A vertex's row of the matrix: what stands on and behind it.
+// Adds the products of a vertex with itself and the vertices ahead.
 template <int channels>
 SEMBLANCE_INLINE void AddNear(const RunProduct& run, std::ptrdiff_t k) {
   Wider sum[channels] = {};
@@ -41,7 +41,7 @@ SEMBLANCE_INLINE void AddNear(const RunProduct& run, std::ptrdiff_t k) {
   }
 }
 
-// Its column: what the run's vertices give to those dj rows on.
+// Adds the transposed products: contributions of the run's vertices to those dj rows ahead.
 template <int channels>
 SEMBLANCE_INLINE void AddFar(const RunProduct& run, std::ptrdiff_t dj, std::ptrdiff_t k) {
   Wider sum[channels] = {};
@@ -103,7 +103,7 @@ StencilMatrix::StencilMatrix(const GridLayout& layout, GridRuns runs)
   entries_.assign(count, 0.0);
 }
 
-// The last run of the row that does not begin behind the column.
+// The last run of the row that begins at or before the column.
 std::size_t StencilMatrix::RunWith(int row, int column) const {
   const auto begin = runs_.begin() + static_cast<std::ptrdiff_t>(first_[row]),
              end = runs_.begin() + static_cast<std::ptrdiff_t>(first_[row + 1]);
@@ -129,7 +129,7 @@ void StencilMatrix::AddPatch(int i, int j, const Matrix16& matrix) {
   }
 }
 
-// To the entries of `count` vertices side by side, in one run.
+// Adds a value to one diagonal's entries at `count` adjacent vertices of one run.
 void StencilMatrix::AddAlong(int row, int column, int count, int slot, double value) {
   const std::size_t run = RunWith(row, column);
   double* const entries = entries_.data() + starts_[run] + kBefore + column - runs_[run].begin +
@@ -137,8 +137,8 @@ void StencilMatrix::AddAlong(int row, int column, int count, int slot, double va
   AddToAll(value, count, entries);
 }
 
-// Vertex by vertex of the patches from behind, so that each entry takes them in the order of
-// AddPatch.
+// Visits the vertices of the patches from the last to the first, so that each entry adds the
+// patches in the order of AddPatch.
 void StencilMatrix::AddPatches(int i, int j, int count, const Matrix16& matrix) {
   const int columns = layout_.grid.Columns(), rows = layout_.grid.Rows();
   for (int b = 0; b < 4; ++b) {

@@ -12,19 +12,20 @@
 namespace semblance {
 namespace {
 
-// What the functions over a patch must show.
-constexpr double kWorthIt = 1;
-// Of the patches of a much finer level over a patch, how many must show something.
-constexpr double kShare = 0.15;
+// Smallest statistic of detail: at 1 the gain of the functions equals their cost in variance.
+constexpr double kMinEvidence = 1;
+// Share of a patch's finer patches that must detect detail. Less follows noise, more misses detail
+// in a part of the patch (chosen on the sets of docs/fit.md, "How good it is").
+constexpr double kMinShare = 0.15;
 
-// Per function of a level, by GridLayout::At: the square of what the residuals sum to, and the sum
-// of their squares.
+// Per function of a level, by GridLayout::At: the square of the residuals' sum, and the sum of
+// their squares.
 struct Evidence {
   std::vector<double> together, apart;
 };
 
-// Points and what is left of them, in the order of the curve. What each level asks of a point
-// stands together: of all points, few are looked at.
+// The fitted points and their residuals, in the order of the curve. The data of a point are stored
+// together, because a sample is scattered over memory.
 struct EvidencePoints {
   struct Place {
     double x, y, weight;  // in patches of level 0
@@ -34,8 +35,9 @@ struct EvidencePoints {
   std::span<const NestedResidual> residuals;
 };
 
-EvidencePoints EvidencePointsOf(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                                std::span<const NestedResidual> residuals) {
+EvidencePoints MakeEvidencePoints(const NestedPoints& points,
+                                  std::span<const std::uint32_t> indices,
+                                  std::span<const NestedResidual> residuals) {
   EvidencePoints of{.channels = points.channels, .places = {}, .residuals = residuals};
   of.places.reserve(indices.size());
   for (const std::uint32_t k : indices) {
@@ -44,14 +46,14 @@ EvidencePoints EvidencePointsOf(const NestedPoints& points, std::span<const std:
   return of;
 }
 
-// Points begin .. end - 1 of a patch, and where on it they are.
+// Points begin .. end - 1, which lie in one patch, and the map from their places to the patch.
 struct PatchOfPoints {
   std::size_t begin, end;
   double scale;
   int i, j;
 };
 
-// Adds the first four numbers to one row of a patch's vertices, and the others to the next.
+// Adds the first four numbers to one row of a patch's vertices, and the other four to the next row.
 SEMBLANCE_INLINE void AddTwoRows(const Wider& sums, double* row, double* next) {
   Wide some[2], there[2];
   std::memcpy(some, &sums, sizeof some);
@@ -63,7 +65,8 @@ SEMBLANCE_INLINE void AddTwoRows(const Wider& sums, double* row, double* next) {
   std::memcpy(next, &there[1], sizeof(Wide));
 }
 
-// Of a patch's sixteen functions: the sums of w N e along each channel, and last of (w N)^2 |e|^2.
+// Adds a patch's points to its sixteen functions: w N e for each channel, and (w N)^2 |e|^2 as the
+// last channel.
 template <int channels>
 SEMBLANCE_INLINE void SumPatch(const EvidencePoints& of, const PatchOfPoints& patch,
                                GridValues& values) {
@@ -107,7 +110,7 @@ SEMBLANCE_WIDE void SumPatchOf3(const EvidencePoints& of, const PatchOfPoints& p
   SumPatch<3>(of, patch, values);
 }
 
-// The channels' sums, and last that of squares.
+// Adds the points of all patches (SumPatch).
 void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridValues& values) {
   constexpr void (*kSum[])(const EvidencePoints&, const PatchOfPoints&, GridValues&) = {
       SumPatchOf1, SumPatchOf2, SumPatchOf3};
@@ -123,7 +126,7 @@ void SumUp(const EvidencePoints& of, const GridLayout& layout, int level, GridVa
   }
 }
 
-// What stands beyond the seam belongs to the columns across it.
+// Adds the values beyond the seam to the columns across it.
 void FoldSeam(GridValues& values) {
   const PatchGrid& grid = values.layout().grid;
   for (int c = 0; grid.periodic_u && c < values.channels(); ++c) {
@@ -135,7 +138,7 @@ void FoldSeam(GridValues& values) {
   }
 }
 
-Evidence EvidenceOn(const EvidencePoints& of, const GridLayout& layout, int level) {
+Evidence ComputeEvidence(const EvidencePoints& of, const GridLayout& layout, int level) {
   const int channels = of.channels;
   GridValues values(layout, channels + 1);
   SumUp(of, layout, level, values);
@@ -151,7 +154,7 @@ Evidence EvidenceOn(const EvidencePoints& of, const GridLayout& layout, int leve
   return evidence;
 }
 
-// Of five columns of a row from 2 i on, for each patch i of the level before.
+// Adds to each patch i of the coarser level the five columns of a row from 2 i on.
 void AddWindows(const GridLayout& layout, const std::vector<double>& values, int row,
                 std::vector<double>& sums) {
   const int columns = layout.grid.Columns();
@@ -168,9 +171,9 @@ void AddWindows(const GridLayout& layout, const std::vector<double>& values, int
   }
 }
 
-// By the functions of a level over each patch of the level before.
-std::vector<char> PatchesSeen(const GridLayout& layout, const GridLayout& coarser,
-                              const Evidence& evidence) {
+// Tests the functions of a level over each patch of the next coarser level.
+std::vector<char> DetectPatches(const GridLayout& layout, const GridLayout& coarser,
+                                const Evidence& evidence) {
   const PatchGrid& grid = coarser.grid;
   std::vector<char> seen(coarser.Patches(), 0);
   std::vector<double> together(grid.patches_u), apart(grid.patches_u);
@@ -185,15 +188,16 @@ std::vector<char> PatchesSeen(const GridLayout& layout, const GridLayout& coarse
       }
     }
     for (int i = 0; i < grid.patches_u; ++i) {
-      seen[coarser.Patch(i, j)] = apart[i] > 0 && together[i] / apart[i] - 1 > kWorthIt ? 1 : 0;
+      seen[coarser.Patch(i, j)] = apart[i] > 0 && together[i] / apart[i] - 1 > kMinEvidence ? 1 : 0;
     }
   }
   return seen;
 }
 
-// Whether the functions of a level see something over a patch of `level`, by enough of its parts.
-bool SeenBy(const UnresolvedDetail& detail, int finer, const GridLayout& layout, int level, int i,
-            int j) {
+// Returns whether the functions of level `finer` detect detail over a large enough share of a patch
+// of `level`.
+bool IsDetected(const UnresolvedDetail& detail, int finer, const GridLayout& layout, int level,
+                int i, int j) {
   const int shift = finer - 1 - level, side = 1 << shift;
   const std::size_t columns = static_cast<std::size_t>(layout.grid.patches_u) << shift;
   int count = 0;
@@ -204,7 +208,7 @@ bool SeenBy(const UnresolvedDetail& detail, int finer, const GridLayout& layout,
         static_cast<std::ptrdiff_t>(row * columns + (static_cast<std::size_t>(i) << shift));
     count += static_cast<int>(std::count(first, first + side, 1));
   }
-  return count > kShare * side * side || (shift == 0 && count > 0);
+  return count > kMinShare * side * side || (shift == 0 && count > 0);
 }
 
 }  // namespace
@@ -214,14 +218,14 @@ UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const NestedSp
                                       std::span<const NestedResidual> residuals) {
   UnresolvedDetail detail{.seen = {}, .first = space.FinestWhole() + 1};
   detail.seen.resize(1);
-  const EvidencePoints of = EvidencePointsOf(points, indices, residuals);
+  const EvidencePoints of = MakeEvidencePoints(points, indices, residuals);
   GridLayout coarser = space[0].layout;
   for (int level = 1; level <= finest; ++level) {
     const GridLayout layout = coarser.Finer();
     detail.seen.emplace_back();
     if (level >= detail.first) {
-      const Evidence evidence = EvidenceOn(of, layout, level);
-      detail.seen.back() = PatchesSeen(layout, coarser, evidence);
+      const Evidence evidence = ComputeEvidence(of, layout, level);
+      detail.seen.back() = DetectPatches(layout, coarser, evidence);
     }
     coarser = layout;
   }
@@ -237,9 +241,9 @@ int OverlayDetail(const UnresolvedDetail& detail, NestedSpace& space) {
       for (int i = 0; i < layout.grid.patches_u; ++i) {
         bool wanted = false;
         for (int finer = level + 1; !wanted && finer <= detail.Finest(); ++finer) {
-          wanted = SeenBy(detail, finer, layout, level, i, j);
+          wanted = IsDetected(detail, finer, layout, level, i, j);
         }
-        if (wanted && space[level].there[layout.Patch(i, j)] != 0) {
+        if (wanted && space[level].present[layout.Patch(i, j)] != 0) {
           added += space.Overlay(level, i, j);
         }
       }
@@ -261,7 +265,7 @@ int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
   for (int j = 0; j < layout.grid.patches_v; ++j) {
     for (int i = 0; i < layout.grid.patches_u; ++i) {
       const std::size_t patch = layout.Patch(i, j);
-      if (space[level].there[patch] != 0 && counts[patch] >= 4 * points_per_patch) {
+      if (space[level].present[patch] != 0 && counts[patch] >= 4 * points_per_patch) {
         added += space.Overlay(level, i, j);
       }
     }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where residuals are correlated, so that finer vertices would follow them.
+// Detection of unresolved detail: correlated residuals that finer vertices would follow.
 #pragma once
 
 #include <cstdint>
@@ -11,31 +11,34 @@
 
 namespace semblance {
 
-// Of residuals e under the functions N of a level: sum |sum_i N_i e_i|^2 / sum N_i^2 |e_i|^2 - 1
-// over some of the functions. Errors that do not know of each other give 0 on the mean, whatever
-// their size and however it changes from place to place; a function whose coefficient is as large
-// as its own standard error gives 1, where taking it is worth just what it costs; and a single
-// gross error gives 0 too, for it agrees with nobody.
+// The test statistic for the functions N (B-splines) of a level and residuals e is
+//
+//   sum |sum_i N_i e_i|^2 / sum N_i^2 |e_i|^2 - 1,
+//
+// summed over the functions over a patch. Its expectation is 0 for independent errors, whatever
+// their sizes. It is 1 for functions whose coefficients equal their standard errors, where adding
+// them gains exactly what it costs. A single gross error gives 0, because no other residual agrees
+// with it.
 struct UnresolvedDetail {
-  // By level: per patch of the level before, whether it should be overlaid for what the functions
-  // of this level see; nothing of levels that were not looked at.
+  // Per level, and per patch of the next coarser level: whether functions of the level detect
+  // detail over the patch. Empty for levels that were not tested.
   std::vector<std::vector<char>> seen;
-  int first = 1;  // that was looked at
+  int first = 1;  // first tested level
   int Finest() const { return static_cast<int>(seen.size()) - 1; }
 };
 
-// Looks at the levels that the space does not have as a whole, up to `finest`. indices and
-// residuals: of the points that were fitted.
+// Tests all levels up to `finest` that are not active as a whole. indices, residuals: those of the
+// fitted points.
 UnresolvedDetail FindUnresolvedDetail(const NestedPoints& points, const NestedSpace& space,
                                       int finest, std::span<const std::uint32_t> indices,
                                       std::span<const NestedResidual> residuals);
 
-// Overlays each patch of the space over which a finer level sees detail, one level at a time.
-// Returns the number of vertices that became active.
+// Overlays each patch of the space over which some finer level detects detail, with vertices of the
+// next level. Returns the number of newly active vertices.
 int OverlayDetail(const UnresolvedDetail& detail, NestedSpace& space);
 
-// Overlays each patch of a level that is there and has at least so many points for each of
-// the patches that it would be split into.
+// Overlays each patch of a level that is present and has at least points_per_patch points for each
+// of its four children. Returns the number of newly active vertices.
 int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
                  NestedSpace& space);
 

@@ -6,14 +6,19 @@
 #include <iterator>
 #include <utility>
 
-#include "fitting/least_squares/cross_validation_score.h"
+#include "fitting/least_squares/cross_validation.h"
 
 namespace semblance {
 namespace {
 
-// Times the weight at which points and energy balance: no more than a plane is left.
-constexpr double kSmoothest = 100;
-constexpr double kMostStretch = 16;
+// The constants below trade solves (time) against a better score. They were chosen on the sets of
+// docs/fit.md, "How good it is".
+
+// Largest weight, relative to the weight at which points and energy balance. Only a plane is left
+// there.
+constexpr double kMaxWeightRatio = 100;
+// Largest stretch of a metric. Larger ones leave almost no bending across the direction.
+constexpr double kMaxStretch = 16;
 
 }  // namespace
 
@@ -28,10 +33,10 @@ double WeightBetween(const NestedWeight& rougher, const NestedWeight& middle,
   return curvature > 0 && down < move && move < up ? middle.weight * std::exp(move) : middle.weight;
 }
 
-// Of two that predict alike the smoother one, so that rounding chooses nothing.
+// If two scores are equal, the larger weight is better, so that round-off does not decide.
 bool NestedWeightSearch::IsBetter(const NestedWeight& next) const {
-  constexpr double kAlike = 1e-5;
-  const double smoother = next.weight > best_.weight ? kAlike : -kAlike;
+  constexpr double kEqual = 1e-5;  // relative; far above round-off, far below any real difference
+  const double smoother = next.weight > best_.weight ? kEqual : -kEqual;
   return std::isnan(best_.score) ? !std::isnan(next.score)
                                  : next.score < (1 + smoother) * best_.score;
 }
@@ -45,10 +50,11 @@ NestedWeight NestedWeightSearch::Try(double weight) {
   steps_ += solve_.Solve(least_gain_);
   const double mean_square = std::max(solve_.MeanSquare(), 0.0);  // less is rounding
   const double trace = solve_.Trace();
-  constexpr double kLeast = 0.02;  // what is left is known no better by the trace of one probe
+  // Error of the trace from one probe, as a share of the points.
+  constexpr double kMinShareLeft = 0.02;
   least_gain_ = part_ * mean_square * solve_.WeightSum() / count_ * std::max(trace, 1.0);
   at->second = {.weight = weight,
-                .score = CrossValidationScore(mean_square, trace, count_, kLeast),
+                .score = CrossValidationScore(mean_square, trace, count_, kMinShareLeft),
                 .degrees_of_freedom = trace,
                 .mean_square = mean_square};
   if (IsBetter(at->second)) {
@@ -59,8 +65,8 @@ NestedWeight NestedWeightSearch::Try(double weight) {
 }
 
 void NestedWeightSearch::Scan() {
-  constexpr double kTurned = 1.05;
-  constexpr int kDecades = 16;
+  constexpr double kTurned = 1.05;  // a score that has clearly risen above the best
+  constexpr int kDecades = 16;      // from 1e2 to 1e-13: down to interpolation in round-off
   const double even = solve_.EvenWeight();
   int turned = 0;
   for (int decade = 2; decade > 2 - kDecades && turned < 1; --decade) {
@@ -70,16 +76,16 @@ void NestedWeightSearch::Scan() {
 }
 
 void NestedWeightSearch::Climb(double factor, double from) {
-  constexpr int kMost = 24;
-  const double smoothest = kSmoothest * solve_.EvenWeight();
+  constexpr int kMaxTries = 24;  // never reached in practice; bounds the loop
+  const double smoothest = kMaxWeightRatio * solve_.EvenWeight();
   Try(std::min(from, smoothest));
-  for (int k = 0; k < kMost; ++k) {
+  for (int k = 0; k < kMaxTries; ++k) {
     const double at = std::isnan(best_.weight) ? from : best_.weight;
     if (at * factor <= smoothest) {
       Try(at * factor);
     }
     if (std::isnan(best_.weight)) {
-      from *= factor;  // so rough that no point is left to judge by
+      from *= factor;  // too rough: no point is left for the score
       continue;
     }
     if (best_.weight == at) {
@@ -91,9 +97,9 @@ void NestedWeightSearch::Climb(double factor, double from) {
   }
 }
 
-void NestedWeightSearch::ClimbAnew(double factor, double from) {
-  constexpr double kRough = 1e-3;
-  const double rough = kRough * solve_.EvenWeight();
+void NestedWeightSearch::ClimbFromRough(double factor, double from) {
+  constexpr double kRoughRatio = 1e-3;  // of the balanced weight; rough enough to show new detail
+  const double rough = kRoughRatio * solve_.EvenWeight();
   Climb(factor, from);
   const double before = best_.weight;
   if (!(before > rough / factor && before < rough * std::pow(factor, 3))) {
@@ -104,18 +110,19 @@ void NestedWeightSearch::ClimbAnew(double factor, double from) {
   }
 }
 
-// Whether the best weight that the search finds in other lengths predicts plainly better; else all
-// is as it was. Lengths are one more number to choose, which the score knows nothing of.
+// Searches with another metric. Returns whether its best score is clearly better; otherwise
+// restores everything. A margin is needed because the score does not account for the choice of the
+// metric.
 template <class Search>
 bool NestedWeightSearch::TryMetric(const BendingMetric& metric, const Search& search) {
-  constexpr double kPlainly = 0.99;
+  constexpr double kClearly = 0.99;  // share of the old score
   const BendingMetric metric_before = solve_.metric();
   const NestedWeight before = std::exchange(best_, {});
   NestedSolve::Packed solution_before = std::exchange(best_solution_, {});
   tried_.clear();
   solve_.SetMetric(metric);
   search();
-  if (best_.score < kPlainly * before.score) {
+  if (best_.score < kClearly * before.score) {
     return true;
   }
   tried_.clear();
@@ -125,20 +132,24 @@ bool NestedWeightSearch::TryMetric(const BendingMetric& metric, const Search& se
   return false;
 }
 
-// The weight changes so that what the surface pays for its bending stays. A surface that is smooth
-// in lengths that are too even bends too evenly: where it points to, the answer lies farther off.
+// The weight changes so that the present surface's cost of bending stays the same. A surface that
+// was smoothed with too little stretch bends too evenly, so the search goes beyond the metric in
+// which the surface bends least.
 void NestedWeightSearch::Stretch(double factor) {
-  constexpr int kMost = 4;
-  constexpr double kApart = 2;     // less is not worth the solves
-  constexpr double kShare = 0.05;  // of the points: fewer parameters leave little to save
+  constexpr int kMaxSteps = 4;       // of the metric; each doubles the stretch at least
+  constexpr double kMinStretch = 2;  // between metrics; less is not worth the solves
+  // Smallest number of parameters per point; below, a better metric saves next to nothing. Without
+  // this limit a million points of ripples took 24 s instead of 0.9 s.
+  constexpr double kMinParameters = 0.05;
   bool better = !std::isnan(best_.weight);
-  for (int k = 0; k < kMost && better && best_.degrees_of_freedom > kShare * count_; ++k) {
+  for (int k = 0; k < kMaxSteps && better && best_.degrees_of_freedom > kMinParameters * count_;
+       ++k) {
     Finish();
     const BendingSums bending = solve_.Bending();
     const BendingMetric from = solve_.metric(),
-                        next = MetricBeyond(from, MetricOfLeastBending(bending, kMostStretch),
-                                            kMostStretch);
-    if (StretchBetween(from, next) < kApart) {
+                        next = MetricBeyond(from, MetricOfLeastBending(bending, kMaxStretch),
+                                            kMaxStretch);
+    if (StretchBetween(from, next) < kMinStretch) {
       return;
     }
     const double weight = best_.weight * BendingIn(from, bending) / BendingIn(next, bending);
@@ -147,11 +158,11 @@ void NestedWeightSearch::Stretch(double factor) {
 }
 
 void NestedWeightSearch::ScanStretches(double factor) {
-  constexpr double kStretch = 4, kTurn_deg = 45;
+  constexpr double kStretch = 4, kTurn_deg = 45;  // coarse steps; Stretch refines them
   const double weight = best_.weight;
   for (int k = 0; k < 4 && !std::isnan(weight); ++k) {
-    TryMetric(MetricOf({.stretch = kStretch, .direction_deg = k * kTurn_deg}),
-              [&] { ClimbAnew(factor, weight); });
+    TryMetric(MakeBendingMetric({.stretch = kStretch, .direction_deg = k * kTurn_deg}),
+              [&] { ClimbFromRough(factor, weight); });
   }
 }
 
@@ -163,7 +174,8 @@ double NestedWeightSearch::Between() const {
   return WeightBetween(std::prev(best)->second, best->second, std::next(best)->second);
 }
 
-NestedWeight NestedWeightSearch::Settle(double weight) {
+NestedWeight NestedWeightSearch::FinalSolve(double weight) {
+  // Remaining gain relative to that of comparisons: 0.1 becomes 1/50.
   constexpr double kFiner = 0.2;
   least_gain_ *= kFiner;
   best_ = {};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The thin-plate weight of a nested fit, and in which lengths it bends, by generalised
+// The choice of a nested fit's thin-plate weight and bending metric by generalised
 // cross-validation.
 #pragma once
 
@@ -12,46 +12,48 @@ namespace semblance {
 
 struct NestedWeight {
   double weight = kNaN;
-  double score = kNaN;               // of generalised cross-validation, mm^2 along one axis
+  double score = kNaN;               // score of cross-validation, mm^2 along one axis
   double degrees_of_freedom = kNaN;  // trace of the influence matrix
-  double mean_square = kNaN;         // of the residuals along one axis
+  double mean_square = kNaN;         // mean squared residual along one axis, mm^2
 };
 
-// The weight between the outer two at which a parabola through the three scores is least, over the
-// logarithms of weights and scores; the middle one if there is none.
+// The minimiser of the parabola through three scores, over the logarithms of weights and scores.
+// Returns the middle weight if the minimum is not between the outer two.
 double WeightBetween(const NestedWeight& rougher, const NestedWeight& middle,
                      const NestedWeight& smoother);
 
-// Craven & Wahba (1979), the trace by one probe. Each solve begins where the one before ended and
-// goes on until what is left to gain is a part of what chance does to the solution.
+// Searches by the score of Craven & Wahba (1979) with the trace from one probe. Each solve starts
+// from the last solution and ends when the remaining gain is a given part of the noise's effect on
+// the solution.
 class NestedWeightSearch {
  public:
-  // count: of the points that the solve has begun with. part: see above, in 0..1.
-  // least_gain: of the first solve (Solve).
+  // count: number of points of the solve. part: see above, in 0 .. 1. least_gain: that of the first
+  // solve (NestedSolve::Solve).
   NestedWeightSearch(std::size_t count, NestedSolve& solve, double part, double least_gain)
       : count_(static_cast<double>(count)), solve_(solve), part_(part), least_gain_(least_gain) {}
 
-  // From smooth to rough by decades until the score has turned.
+  // Tries weights from smooth to rough by decades until the score rises.
   void Scan();
-  // Uphill and downhill from a weight, by a factor, until neither is better.
+  // Multiplies and divides the best weight by a factor until neither improves the score.
   void Climb(double factor, double from);
-  // The same on finer vertices than those that the weight was found for: a rough one is tried too,
-  // for detail that the coarser ones could not follow looked like noise to them. Not where the best
-  // is nearly as rough: there is no such detail.
-  void ClimbAnew(double factor, double from);
+  // Climbs, and also tries a rough weight. Use it after the space was refined: detail that the
+  // coarser vertices could not follow looked like noise to them. The rough weight is skipped if the
+  // best weight is nearly as rough.
+  void ClimbFromRough(double factor, double from);
 
-  // From the best weight on: lengths in which the surface bends less, as long as they predict
-  // plainly better. At every step the surface itself tells them.
+  // Improves the metric, starting from the best weight. Each step takes the metric in which the
+  // present surface bends least and goes beyond it, as long as the score clearly improves.
   void Stretch(double factor);
-  // Where the surface shows nothing of what is there: lengths stretched along four directions.
+  // Tries metrics stretched along four directions, for a surface that does not show any detail yet.
   void ScanStretches(double factor);
 
-  // Brings the solve to the best weight and lengths.
+  // Sets the solve to the best weight, metric and solution.
   NestedWeight Finish();
-  // WeightBetween of the best and those beside it; the best, if one of them was not tried.
+  // WeightBetween of the best weight and its two neighbours; the best weight if a neighbour is
+  // missing.
   double Between() const;
-  // Solves with this weight, more exactly than to compare weights, and takes it for the best.
-  NestedWeight Settle(double weight);
+  // Solves with this weight, more accurately than for comparisons, and makes it the best.
+  NestedWeight FinalSolve(double weight);
   int steps() const { return steps_; }
   double least_gain() const { return least_gain_; }  // for the next search
 
@@ -64,7 +66,7 @@ class NestedWeightSearch {
   double count_;
   NestedSolve& solve_;
   double part_;
-  std::map<double, NestedWeight> tried_;  // in the lengths of the solve
+  std::map<double, NestedWeight> tried_;  // with the present metric
   NestedWeight best_;
   NestedSolve::Packed best_solution_;
   double least_gain_;

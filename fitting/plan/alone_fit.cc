@@ -5,7 +5,7 @@
 #include <utility>
 #include <variant>
 
-#include "fitting/nested/nested_steps.h"
+#include "fitting/nested/nested_fit.h"
 
 namespace semblance {
 namespace {

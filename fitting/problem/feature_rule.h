@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a fit may do to the offsets that make a face's features (thesis 4.3). Whatever the rule,
-// they ride along when a coarser level moves.
+// Rules for the offsets that make a face's features (thesis 4.3). Under every rule the features
+// move with the coarser levels.
 #pragma once
 
 #include <string_view>
@@ -10,36 +10,39 @@
 
 namespace semblance {
 
-// They are fitted as any others, and afterwards get back the template's offsets (thesis 4.3).
+// The features' offsets are fitted like all others. After the fit they get back the template's
+// offsets (thesis 4.3).
 struct RestoreFeatures {
   static constexpr std::string_view kName = "restore";
 };
 template <class Visitor>
 void Fields(Visitor&, RestoreFeatures&) {}
 
+// The features' offsets are fitted like all others.
 struct FreeFeatures {
   static constexpr std::string_view kName = "free";
 };
 template <class Visitor>
 void Fields(Visitor&, FreeFeatures&) {}
 
-// They resist moves: as PriorTerm (term.h) from the start of a level's solve, of them alone.
+// A PriorTerm (term.h) over the features alone holds them to their places at the start of a level's
+// solve.
 struct WeightedFeatures {
   static constexpr std::string_view kName = "weighted";
-  double weight = 1;  // 0 is free; more resists the fit
+  double weight = 1;
 };
 template <class Visitor>
 void Fields(Visitor& visit, WeightedFeatures& o) {
-  visit(
-      FieldInfo{.name = "weight",
-                .min = 0,
-                .max = 1e6,
-                .doc = "factor of the mean over a level's control vertices of the squared move of "
-                       "the features'; 0 is free"},
-      o.weight);
+  visit(FieldInfo{.name = "weight",
+                  .min = 0,
+                  .max = 1e6,
+                  .doc = "factor of the sum of the features' squared moves over the number of the "
+                         "level's control vertices; 0: the features are free"},
+        o.weight);
 }
 
-// Their offsets stay to the bit; the other vertices are fitted as if they could not move.
+// The features' offsets keep their exact bits. The other vertices are fitted as if the features
+// could not move.
 struct FrozenFeatures {
   static constexpr std::string_view kName = "frozen";
 };

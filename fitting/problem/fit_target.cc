@@ -24,7 +24,7 @@ void CheckSizes(const ScatteredPoints& p) {
   }
 }
 
-// `label`: of the point, or nothing.
+// label: the point's, or empty.
 void CheckPoint(std::size_t index, std::string_view label, const Vec3& position, const Vec2& uv,
                 double weight) {
   const auto fail = [&](const std::string& what) {

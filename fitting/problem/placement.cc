@@ -16,7 +16,7 @@
 namespace semblance {
 namespace {
 
-// Weighted means, and second moments about them, of both point sets.
+// Weighted means of both point sets, and second moments about the means.
 struct Moments {
   Vec3 mean_template = Vec3::Zero();
   Vec3 mean_subject = Vec3::Zero();
@@ -76,7 +76,8 @@ Moments MakeMoments(std::span<const Vec3> on_template, std::span<const Vec3> on_
   return m;
 }
 
-// A rotation is determined if both sets span a plane at least; the cross moments have rank 2 then.
+// The best rotation. It is determined if both sets span at least a plane; then the cross moments
+// have rank >= 2.
 Mat3 BestRotation(const Moments& m) {
   const Eigen::JacobiSVD<Mat3> svd(m.cross, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double size = std::sqrt(m.spread_template * m.spread_subject);

@@ -20,7 +20,7 @@ struct Patches {
   Vec2 Center(int i, int j) const { return {(i + 0.5) / u, (j + 0.5) / v}; }
 };
 
-// One per patch, i fastest.
+// The seed of a patch. Seeds are stored with i fastest.
 struct Seed {
   Vec3 on_surface = Vec3::Constant(kNaN);
   std::optional<Vec3> on_mesh;
@@ -62,8 +62,8 @@ bool IsMasked(const Vec3& p, std::span<const Sphere> masks) {
 }
 
 // The unit normal of a coarse level's own surface. Normals of the full surface cross within the
-// radius of its concave parts (under the lip, beside the nose: a few mm), so that rays of 10 mm and
-// more would land in the wrong order; the coarse levels of a face have no such parts.
+// radius of its concave parts (under the lip and beside the nose: a few mm), so rays of 10 mm and
+// more would land in the wrong order. The coarse levels of a face have no such parts.
 Vec3 SmoothNormal(const HSplineSurface& surface, int level, const Vec2& uv) {
   const SurfaceFrame frame = surface.LevelFrame(level, uv);
   return frame.du.cross(frame.dv).normalized();  // zero where the surface has no tangent plane
@@ -141,12 +141,12 @@ std::vector<Seed> FindSeeds(const HSplineSurface& placed, const Seeder& seeder,
   return seeds;
 }
 
-// Whether the way from a to b runs backwards on the mesh against the surface.
+// Returns whether the direction from a to b on the mesh is opposite to that on the surface.
 bool Reversed(const Seed& a, const Seed& b) {
   return a.on_mesh && b.on_mesh && (*b.on_mesh - *a.on_mesh).dot(b.on_surface - a.on_surface) < 0;
 }
 
-// How many of the four neighbours of patch (i, j) have changed places with it.
+// Counts the neighbours (of four) that have changed places with patch (i, j).
 int CountReversed(const std::vector<Seed>& seeds, const Patches& patches, int i, int j) {
   const auto at = [&](int a, int b) -> const Seed* {
     a = PlaceAmong(patches.u, a, patches.periodic_u);
@@ -161,8 +161,9 @@ int CountReversed(const std::vector<Seed>& seeds, const Patches& patches, int i,
   return count;
 }
 
-// A fold is a pair of neighbours that have changed places. The seed with most such pairs goes first
-// (of equals the one that lies farther off, then the first), until there is none.
+// A fold is a pair of neighbours that have changed places. Drops the seed with most folds until
+// none is left; ties drop the seed that lies farther from the surface, then the first one. Returns
+// the number of dropped seeds.
 int DropFolds(const Patches& patches, std::vector<Seed>& seeds) {
   for (int dropped = 0;; ++dropped) {
     std::pair<int, double> worst = {0, 0};

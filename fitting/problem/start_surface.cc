@@ -18,7 +18,7 @@ Vec3 Around(double turns) {
   return {1, std::cos(angle), std::sin(angle)};
 }
 
-// The functions of (u,v) whose sums the surface is taken from.
+// The functions of (u,v) whose linear combinations give the surface.
 Vec3 OpenFunctions(const Vec2& uv) { return {1, uv.x(), uv.y()}; }
 
 Eigen::Matrix<double, 6, 1> TubeFunctions(const Vec2& uv) {
@@ -27,8 +27,8 @@ Eigen::Matrix<double, 6, 1> TubeFunctions(const Vec2& uv) {
 }
 
 template <int n>
-ControlNet NetOf(Eigen::Matrix<double, n, 1> (*functions)(const Vec2&), const HSplineShape& shape,
-                 std::span<const Vec3> positions, std::span<const Vec2> uv) {
+ControlNet FitNet(Eigen::Matrix<double, n, 1> (*functions)(const Vec2&), const HSplineShape& shape,
+                  std::span<const Vec3> positions, std::span<const Vec2> uv) {
   Eigen::Matrix<double, n, n> normal = Eigen::Matrix<double, n, n>::Zero();
   Eigen::Matrix<double, n, 3> right = Eigen::Matrix<double, n, 3>::Zero();
   const Vec3 mean = std::accumulate(positions.begin(), positions.end(), Vec3(Vec3::Zero())) /
@@ -65,8 +65,8 @@ void Check(const HSplineShape& shape, std::span<const Vec3> positions, std::span
 HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
                             std::span<const Vec2> uv) {
   Check(shape, positions, uv);
-  return HSplineSurface(shape, shape.ClosedU() ? NetOf(TubeFunctions, shape, positions, uv)
-                                               : NetOf(OpenFunctions, shape, positions, uv));
+  return HSplineSurface(shape, shape.ClosedU() ? FitNet(TubeFunctions, shape, positions, uv)
+                                               : FitNet(OpenFunctions, shape, positions, uv));
 }
 
 }  // namespace semblance

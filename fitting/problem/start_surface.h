@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A surface to start from where there is no template.
+// A start surface for a fit without a template.
 #pragma once
 
 #include <span>
@@ -9,11 +9,12 @@
 
 namespace semblance {
 
-// A smooth surface near the points, with level 0 alone: the least-squares fit of all affine maps of
-// (u,v) (open), or of all sums of 1, cos and sin of 2 pi u, each with and without v (closed in u).
-//   positions: mm; uv: in [0,1] x [0,1], one per position.
-// Throws InputError for no points, a number of uv that is not that of the points, and a shape as
-// CheckShape does.
+// Makes a smooth surface near the points, with level 0 alone. It is the least-squares fit by linear
+// combinations of
+//   1, u, v                                (open), or
+//   {1, cos 2 pi u, sin 2 pi u} x {1, v}   (closed in u).
+// positions: mm; uv: in [0,1] x [0,1], one per position. Throws InputError if there are no points
+// or the numbers differ, and like CheckShape for the shape.
 HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
                             std::span<const Vec2> uv);
 

@@ -28,7 +28,7 @@ double DoubleArea(const std::array<int, 3>& t, std::span<const Vec2> uv) {
   return a.x() * b.y() - a.y() * b.x();
 }
 
-// Indices by u, then v, so that equal places are neighbours and the order given has no effect.
+// Indices sorted by u, then v, so that the given order has no effect.
 std::vector<int> Ordered(std::span<const Vec2> uv) {
   std::vector<int> order(uv.size());
   std::iota(order.begin(), order.end(), 0);
@@ -75,8 +75,10 @@ void DowelMesh::Link(std::span<const Vec2> uv) {
 }
 
 bool DowelMesh::Turned(const std::array<int, 3>& triangle, std::span<const Vec2> uv) const {
-  constexpr double kLeft = 0.01;  // of the area that it had in the template
-  return DoubleArea(triangle, uv) <= kLeft * DoubleArea(triangle, rest_uv_);
+  // Smallest share of the template's area. Above 0, because a triangle without area cannot recover;
+  // below about 0.1, because moves legitimately squeeze triangles.
+  constexpr double kMinShare = 0.01;
+  return DoubleArea(triangle, uv) <= kMinShare * DoubleArea(triangle, rest_uv_);
 }
 
 int DowelMesh::Flips(std::span<const Vec2> uv) const {

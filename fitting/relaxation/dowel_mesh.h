@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The network of a fit's points in (u,v), which says who is whose neighbour.
+// The network of a fit's points in (u,v), which defines their neighbours.
 #pragma once
 
 #include <array>
@@ -13,24 +13,24 @@ namespace semblance {
 
 enum class DowelLinks { kDelaunay, kNone };
 
-// The Delaunay triangles of the points' (u,v), in mm of the template. Points of the same (u,v)
-// share a corner. Where u or v is closed the network is cut at 0, which no point passes. Without
-// links it is the points alone, each its own corner.
+// The Delaunay triangles of the points' (u,v), scaled to mm of the template. Points of the same
+// (u,v) share a corner. On a surface closed in u the network is cut at u = 0, and no point crosses
+// the cut. Without links there are no triangles, and each point is its own corner.
 class DowelMesh {
  public:
-  // uv: of each point on the template surface, before any move. Any number of points will do: fewer
-  // than three, or all on a line, have no triangles.
+  // uv: the points' places in the template, before any move. Fewer than three points, or points on
+  // a line, have no triangles.
   DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv,
             DowelLinks links = DowelLinks::kDelaunay);
   const std::vector<std::array<int, 3>>& triangles() const { return triangles_; }
   const std::vector<std::array<int, 2>>& edges() const { return edges_; }
-  // For each point the one that stands for it: itself, or the first of the same (u,v).
+  // The corner of each point: the point itself, or the first point of the same (u,v).
   const std::vector<int>& corner() const { return corner_; }
   const std::vector<Vec2>& rest_uv() const { return rest_uv_; }
-  const Vec2& lengths_mm() const { return lengths_mm_; }  // of the template along u and v
-  // How many triangles are turned over with the points at uv.
+  const Vec2& lengths_mm() const { return lengths_mm_; }  // MeanLengths of the template
+  // Counts the turned triangles with the points at uv.
   int Flips(std::span<const Vec2> uv) const;
-  // Whether one is, or has lost nearly all of its area.
+  // Returns whether a triangle is turned over, or has lost 99 % of its area in the template.
   bool Turned(const std::array<int, 3>& triangle, std::span<const Vec2> uv) const;
 
  private:
@@ -43,8 +43,8 @@ class DowelMesh {
   Vec2 lengths_mm_;
 };
 
-// The largest angle between the surface's normals at two neighbours of the network, whose points
-// are at uv; 0 without neighbours.
+// The largest angle between the surface's normals at two neighbours of the network, with the points
+// at uv; 0 without neighbours.
 double SharpestCrease_deg(const HSplineSurface& surface, const DowelMesh& mesh,
                           std::span<const Vec2> uv);
 

@@ -17,31 +17,32 @@
 namespace semblance {
 namespace {
 
-constexpr int kFinestMoved = 2;     // level; finer ones cost more and change little
-constexpr double kSettled = 0.1;    // moves, of the distances
-constexpr double kSameFoot = 0.01;  // of the noise
+constexpr int kFinestLevel = 2;     // of the coarse fit; finer levels cost more and change little
+constexpr double kMoveRatio = 0.1;  // moves below this share of the distances end the rounds
+constexpr double kFootTolerance = 0.01;  // of a foot, relative to the noise
 
-// The shorter way round.
-Vec2 WayOnMap(const HSplineShape& shape, const Vec2& from, const Vec2& to) {
+// The way from one (u,v) to another, the shorter one along a closed u.
+Vec2 ShortestWay(const HSplineShape& shape, const Vec2& from, const Vec2& to) {
   Vec2 way = to - from;
   way.x() -= shape.ClosedU() ? std::round(way.x()) : 0;
   return way;
 }
 
 Vec2 HalfWay(const HSplineShape& shape, const Vec2& from, const Vec2& to) {
-  const Vec2 middle = from + WayOnMap(shape, from, to) / 2;
+  const Vec2 middle = from + ShortestWay(shape, from, to) / 2;
   return {IntoUnit(middle.x(), shape.ClosedU()), std::clamp(middle.y(), 0.0, 1.0)};
 }
 
-// Twice its area on the map, negative for one that runs clockwise.
+// Twice the area of a triangle in (u,v), negative if it runs clockwise.
 double AreaOnMap(const HSplineShape& shape, const Triangle& t, std::span<const Vec2> uv) {
-  const Vec2 a = WayOnMap(shape, uv[t[0]], uv[t[1]]), b = WayOnMap(shape, uv[t[0]], uv[t[2]]);
+  const Vec2 a = ShortestWay(shape, uv[t[0]], uv[t[1]]), b = ShortestWay(shape, uv[t[0]], uv[t[2]]);
   return a.x() * b.y() - a.y() * b.x();
 }
 
-// Those that run as most do, in that sense.
-std::vector<Triangle> InMostSense(const HSplineShape& shape, std::span<const Triangle> triangles,
-                                  std::span<const Vec2> uv) {
+// The triangles with the majority's orientation, turned counter-clockwise.
+std::vector<Triangle> MajorityTriangles(const HSplineShape& shape,
+                                        std::span<const Triangle> triangles,
+                                        std::span<const Vec2> uv) {
   const auto mirrored = std::ranges::count_if(
       triangles, [&](const Triangle& t) { return AreaOnMap(shape, t, uv) < 0; });
   const double sense = 2 * mirrored > std::ssize(triangles) ? -1 : 1;
@@ -54,11 +55,12 @@ std::vector<Triangle> InMostSense(const HSplineShape& shape, std::span<const Tri
   return kept;
 }
 
-// The points on one coarse surface.
+// A coarse surface with the points' feet on it.
 struct OnCoarse {
   HSplineSurface surface;
   std::vector<Vec2> uv, feet;
-  std::vector<double> distance_mm, move_mm;  // from the foot, and from where it was to there
+  std::vector<double> distance_mm;  // from the point to its foot
+  std::vector<double> move_mm;      // from S(uv) to the foot
   std::vector<char> outlier;
 };
 
@@ -71,7 +73,7 @@ class FootMover {
   MovedUv Run() {
     const OnCoarse first = Fit({points_.uv.begin(), points_.uv.end()});
     OnCoarse last = first;
-    for (moves_.rounds = 0; moves_.rounds < plan_.relaxation_rounds && !IsSettled(last);) {
+    for (moves_.rounds = 0; moves_.rounds < plan_.relaxation_rounds && !HasConverged(last);) {
       context_.ThrowIfStopped();
       int folds_prevented = 0;
       OnCoarse next = Fit(Moved(last, folds_prevented));
@@ -82,7 +84,7 @@ class FootMover {
       ++moves_.rounds;
       moves_.folds_prevented += folds_prevented;
     }
-    Tell(first, last);
+    SetStatistics(first, last);
     return {std::move(last.uv), moves_};
   }
 
@@ -90,22 +92,23 @@ class FootMover {
   OnCoarse Fit(std::vector<Vec2> uv) {
     context_.Report("relaxation", fmt::format("round {}", moves_.rounds + 1));
     AutoPlan coarse = plan_;
-    coarse.finest = std::min(plan_.finest, kFinestMoved);
+    coarse.finest = std::min(plan_.finest, kFinestLevel);
     NestedFitResult fit = FitNested(StartSurface(shape_, points_.positions, uv),
                                     {points_.positions, uv, points_.weights}, coarse, context_);
-    OnCoarse on{std::move(fit.surface), std::move(uv), {}, {}, {}, {}};
+    OnCoarse on{std::move(fit.surface), std::move(uv),  /*feet=*/{},
+                /*distance_mm=*/{},     /*move_mm=*/{}, {}};
     on.outlier.assign(on.uv.size(), 0);
     for (const std::uint32_t k : fit.report.outliers) {
       on.outlier[k] = 1;
     }
-    Project(kSameFoot * fit.report.noise_mm, on);
+    Project(kFootTolerance * fit.report.noise_mm, on);
     return on;
   }
 
   void Project(double tolerance_mm, OnCoarse& on) const {
-    constexpr std::size_t kBlock = 256;
-    constexpr double kLeast = 1e-300;
-    const ProjectOptions options{.tolerance_mm = std::max(tolerance_mm, kLeast)};
+    constexpr std::size_t kBlock = 256;          // points per task of a thread
+    constexpr double kMinTolerance_mm = 1e-300;  // 0 is not allowed
+    const ProjectOptions options{.tolerance_mm = std::max(tolerance_mm, kMinTolerance_mm)};
     const std::vector<Vec3> places = HSplineBatch(on.surface).Points(on.uv, context_.threads);
     on.feet.resize(on.uv.size());
     on.distance_mm.resize(on.uv.size());
@@ -119,7 +122,7 @@ class FootMover {
     });
   }
 
-  // An outlier has no foot on this surface.
+  // The feet; outliers stay, because they do not belong to this surface.
   std::vector<Vec2> Moved(const OnCoarse& on, int& folds_prevented) const {
     std::vector<Vec2> uv = on.feet;
     for (std::size_t k = 0; k < uv.size(); ++k) {
@@ -129,7 +132,7 @@ class FootMover {
     return uv;
   }
 
-  // Weighted, of points that are outliers of neither.
+  // The weighted root mean square over points that are outliers of neither a nor b.
   double Rms(std::span<const double> lengths_mm, const OnCoarse& a, const OnCoarse& b) const {
     double sum = 0, weights = 0;
     for (std::size_t k = 0; k < lengths_mm.size(); ++k) {
@@ -141,15 +144,15 @@ class FootMover {
     return std::sqrt(sum / weights);
   }
 
-  bool IsSettled(const OnCoarse& on) const {
-    return Rms(on.move_mm, on, on) <= kSettled * Rms(on.distance_mm, on, on);
+  bool HasConverged(const OnCoarse& on) const {
+    return Rms(on.move_mm, on, on) <= kMoveRatio * Rms(on.distance_mm, on, on);
   }
 
   bool IsNearer(const OnCoarse& next, const OnCoarse& before) const {
     return Rms(next.distance_mm, next, before) < Rms(before.distance_mm, next, before);
   }
 
-  void Tell(const OnCoarse& first, const OnCoarse& last) {
+  void SetStatistics(const OnCoarse& first, const OnCoarse& last) {
     moves_.rms_before_mm = Rms(first.distance_mm, first, last);
     moves_.rms_after_mm = Rms(last.distance_mm, first, last);
     const HSplineBatch batch(last.surface);
@@ -182,8 +185,8 @@ MovedUv MoveToFeet(const HSplineShape& shape, const ScatteredPoints& points,
 
 int KeepFromFolding(const HSplineShape& shape, std::span<const Triangle> triangles,
                     std::span<const Vec2> from, std::span<Vec2> to) {
-  constexpr int kMostHalvings = 6;
-  const std::vector<Triangle> kept = InMostSense(shape, triangles, from);
+  constexpr int kMaxHalvings = 6;  // then a move is dropped; 1/64 of it is not worth more passes
+  const std::vector<Triangle> kept = MajorityTriangles(shape, triangles, from);
   int prevented = 0;
   for (int pass = 0;; ++pass) {
     std::vector<char> moves_less(to.size(), 0);
@@ -202,7 +205,7 @@ int KeepFromFolding(const HSplineShape& shape, std::span<const Triangle> triangl
     prevented = pass == 0 ? turned : prevented;
     for (std::size_t k = 0; k < to.size(); ++k) {
       if (moves_less[k] != 0) {
-        to[k] = pass < kMostHalvings ? HalfWay(shape, from[k], to[k]) : from[k];
+        to[k] = pass < kMaxHalvings ? HalfWay(shape, from[k], to[k]) : from[k];
       }
     }
   }

@@ -23,10 +23,10 @@
 namespace semblance {
 namespace {
 
-constexpr int kSteps = 5;        // of Levenberg-Marquardt, per round
-constexpr double kBeyond = 0.1;  // of a patch: how far past its edge its polynomial is used
-constexpr int kHalvings = 8;     // of single steps, for the barrier
-constexpr int kAllHalvings = 4;  // of all steps, until the cost falls
+constexpr int kSteps = 5;        // of Levenberg-Marquardt; the next round starts from a new patch
+constexpr double kBeyond = 0.1;  // reach beyond a patch's edge; its polynomial extrapolates there
+constexpr int kHalvings = 8;     // of a single move, for the barrier; then it is dropped
+constexpr int kAllHalvings = 4;  // of all moves; each costs a fit
 using Mat2 = Eigen::Matrix2d;
 
 struct PatchIndex {
@@ -38,8 +38,8 @@ PatchIndex PatchAt(const PatchGrid& grid, const Vec2& uv) {
           std::clamp(static_cast<int>(uv.y() * grid.patches_v), 0, grid.patches_v - 1)};
 }
 
-// factor (S(u,v) - p); S is the patch's polynomial, and the detail that rides on it. Parameters:
-// (u,v) in mm, then the patch's sixteen vertices.
+// Residual factor (S(u,v) - p). S is the patch's polynomial plus the detail of finer levels.
+// Parameter blocks: (u,v) in mm, then the patch's sixteen vertices.
 class JointPointCost final : public ceres::CostFunction {
  public:
   JointPointCost(const JointLevel& level, const PatchIndex& patch, const Vec3& position,
@@ -96,8 +96,8 @@ class JointPointCost final : public ceres::CostFunction {
   double factor_;
 };
 
-// The quadratic model of a corner's penalties about a place: 2 g . m + m . M m but for a constant,
-// m being the way from there; g, m and M in mm.
+// The quadratic model of a corner's penalties about a place: 2 g . m + m . M m up to a constant,
+// where m is the move from the place; g, m and M in mm.
 class PenaltyCost final : public ceres::SizedCostFunction<2, 2> {
  public:
   PenaltyCost(const Vec2& place, const Vec2& gradient, const Mat2& matrix)
@@ -135,10 +135,10 @@ class JointRound {
         penalty_weight_(PointWeight(level.terms) / static_cast<double>(target.points.size())),
         weight_sum_(relaxer_.mean_weight() * static_cast<double>(target.points.size())) {}
 
-  // Where the points arrive.
+  // Returns the new (u,v) of the points.
   std::vector<Vec2> Run(RelaxationSummary& summary) {
     summary.before = relaxer_.Penalties();
-    const std::vector<Vec2> way = Shortened(Solved(), summary);
+    const std::vector<Vec2> way = Shortened(SolveMoves(), summary);
     const double before = Energy(start_);
     double share = 1;
     for (int k = 0; k < kAllHalvings; ++k, share /= 2) {
@@ -154,8 +154,8 @@ class JointRound {
   }
 
  private:
-  // The way that each corner would like to go, zero for other points.
-  std::vector<Vec2> Solved();
+  // The move of each corner in (u,v) that minimises the joint problem; zero for other points.
+  std::vector<Vec2> SolveMoves();
   void AddPoints(ControlNet& net, std::vector<Vec2>& places, ceres::Problem& problem) const;
   void AddPoint(const FitPoint& point, std::size_t k, double scale,
                 std::unique_ptr<ceres::LossFunction> loss, ControlNet& net,
@@ -163,7 +163,7 @@ class JointRound {
   void AddPenalties(std::vector<Vec2>& places, ceres::Problem& problem) const;
   void Bound(std::vector<Vec2>& places, ceres::Problem& problem) const;
 
-  // Halves the ways to the corners of triangles that would turn over; the last resort is to stay.
+  // Halves the moves of the corners of triangles that would turn over, and at last drops them.
   std::vector<Vec2> Shortened(std::vector<Vec2> way, RelaxationSummary& summary) const {
     std::vector<char> cut(way.size());
     bool moving = moves_.barrier;
@@ -191,7 +191,7 @@ class JointRound {
     return way;
   }
 
-  // All points, `share` of the way of their corners on.
+  // The (u,v) of all points after the given share of their corners' moves.
   std::vector<Vec2> At(const std::vector<Vec2>& way, double share) const {
     std::vector<Vec2> uv = start_;
     for (std::size_t k = 0; k < uv.size(); ++k) {
@@ -208,7 +208,7 @@ class JointRound {
     relaxer_.SetUv(uv);
     double sum = 0;
     for (const int corner : order_) {
-      sum += relaxer_.Held(corner).energy;
+      sum += relaxer_.WithoutDistance(corner).energy;
     }
     return level_.cost(target) + penalty_weight_ * sum;
   }
@@ -218,7 +218,7 @@ class JointRound {
   const JointLevel& level_;
   const FitTarget& target_;
   Relaxer relaxer_;
-  std::vector<int> order_;  // of the corners
+  std::vector<int> order_;  // the corners, sorted by the template's (u,v)
   std::vector<Vec2> start_;
   double penalty_weight_;
   double weight_sum_;
@@ -250,7 +250,8 @@ void JointRound::AddPoints(ControlNet& net, std::vector<Vec2>& places,
   }
 }
 
-// At the k-th place; scale: of its squared distance, which a loss has in itself.
+// Adds the residual of a point at the k-th place. scale: factor of its squared distance; a loss
+// already includes it.
 void JointRound::AddPoint(const FitPoint& point, std::size_t k, double scale,
                           std::unique_ptr<ceres::LossFunction> loss, ControlNet& net,
                           std::vector<Vec2>& places, ceres::Problem& problem) const {
@@ -268,7 +269,7 @@ void JointRound::AddPenalties(std::vector<Vec2>& places, ceres::Problem& problem
   const Mat2 per_mm = level_.view.lengths_mm.cwiseInverse().asDiagonal();
   for (std::size_t k = 0; k < places.size(); ++k) {
     const int corner = order_[k];
-    const LocalPenalty held = relaxer_.Held(corner);
+    const LocalPenalty held = relaxer_.WithoutDistance(corner);
     const Mat2 matrix = per_mm * (held.matrix + relaxer_.Damping(corner)) * per_mm;
     problem.AddResidualBlock(new PenaltyCost(places[k], penalty_weight_ * (per_mm * held.gradient),
                                              penalty_weight_ * (matrix + 1e-12 * Mat2::Identity())),
@@ -276,7 +277,7 @@ void JointRound::AddPenalties(std::vector<Vec2>& places, ceres::Problem& problem
   }
 }
 
-// In the patch or little beyond, in the domain, and not farther than allowed.
+// Bounds each place to its patch and slightly beyond, to the domain, and to max_move_mm.
 void JointRound::Bound(std::vector<Vec2>& places, ceres::Problem& problem) const {
   const Vec2 patches(level_.view.grid.patches_u, level_.view.grid.patches_v);
   for (std::size_t k = 0; k < places.size(); ++k) {
@@ -318,7 +319,7 @@ ceres::Solver::Options SchurOptions(std::vector<Vec2>& places, ControlNet& net,
   return options;
 }
 
-std::vector<Vec2> JointRound::Solved() {
+std::vector<Vec2> JointRound::SolveMoves() {
   ControlNet net = level_.view.start;
   std::vector<Vec2> places;
   for (const int corner : order_) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A round of relaxation that moves (u,v) and control vertices in one problem.
+// One round of the joint relaxation, which moves (u,v) and control vertices in one problem.
 #pragma once
 
 #include <functional>
@@ -7,27 +7,30 @@
 
 #include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/relaxation.h"
-#include "fitting/solve/level_fit.h"
+#include "fitting/solve/space_solve.h"
 
 namespace semblance {
 
-// The level that is being fitted.
+// The level of the fit.
 struct JointLevel {
-  LevelView view;                          // of the target's points where they are
-  std::span<const Term> terms;             // one of them at least `points` with a weight
-  const HSplineSurface* detail = nullptr;  // whose levels finer than `level` the points see too
-  int level = 0;                           // of the view
-  std::function<double(const FitTarget&)> cost;  // of the terms, after a fit of the level to it
+  LevelView view;               // of the target's points at their present (u,v)
+  std::span<const Term> terms;  // at least one `points` with a positive weight
+  // The surface whose levels finer than `level` are added to the view's surface; null: none.
+  const HSplineSurface* detail = nullptr;
+  int level = 0;
+  std::function<double(const FitTarget&)> cost;  // fits the level, and returns the terms' cost
 };
 
-// Moves (u,v) and the level's control vertices in one ceres::Problem: the points' terms as
-// functions of both, the other terms, and the penalties of relaxation.h relative to the points'
-// weight, with each point's neighbours held. The Schur complement eliminates the (u,v), one block
-// of two per corner of the mesh. Levenberg-Marquardt takes a few steps, in which a point stays in
-// its patch or little beyond it. Then each (u,v) moves as far as no triangle turns over. While the
-// terms, fitted there, and the penalties do not cost less than before, all moves are halved, and at
-// last dropped. The vertices are left for the caller to fit. Throws InputError without a term
-// `points`.
+// Moves (u,v) and the level's control vertices in one ceres::Problem. Its residuals are the points'
+// terms as functions of both, the other terms, and the penalties of relaxation.h with each point's
+// neighbours fixed, relative to the points' weight. The Schur complement eliminates the (u,v), one
+// block of two per corner of the mesh. Levenberg-Marquardt takes a few steps, which keep a point
+// within its patch or slightly beyond.
+//
+// The moves of (u,v) are then shortened until no triangle turns over (with the barrier). All moves
+// are halved, and at last dropped, while the cost of the terms (after a fit) and the penalties is
+// not below that before. The vertices are left for the caller to fit. Throws InputError without a
+// term `points`.
 RelaxationSummary RelaxJointly(const HSplineSurface& surface, const HSplineSurface& rest,
                                const DowelMesh& mesh, const NetworkMoves& moves,
                                const JointLevel& level, FitTarget& target);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "fitting/shape_model/shape_fit.h"
 
+#include <ceres/cost_function.h>
 #include <ceres/loss_function.h>
 #include <ceres/normal_prior.h>
 #include <ceres/problem.h>
@@ -9,13 +10,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 #include <numbers>
 #include <optional>
 #include <span>
 #include <utility>
 
-#include "fitting/shape_model/shape_cost.h"
+#include "fitting/shape_model/shape_model.h"
 #include "fitting/shape_model/shape_posterior.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/farthest_first.h"
@@ -24,9 +26,61 @@
 namespace semblance {
 namespace {
 
-constexpr int kPoseRounds = 2;         // rounds that move the pose alone
-constexpr int kFirstSurfaceRound = 3;  // from 0
-constexpr double kStillMm = 5e-3;      // a round that moves less is the last
+constexpr int kPoseRounds = 2;              // first rounds, which move the pose alone
+constexpr int kFirstSurfaceRound = 3;       // counted from 0; before, points would find wrong feet
+constexpr double kMoveTolerance_mm = 5e-3;  // ends the rounds; far below any error of the data
+
+// Residual whitening * (x - position), where x is the placed point of the observation. Parameter
+// blocks: the pose, the coefficients and, if there is one, the field.
+class ShapeCost final : public ceres::CostFunction {
+ public:
+  // Both must outlive the cost.
+  ShapeCost(const ShapeFrame& frame, const ShapeObservation& observation);
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const ShapeFrame& frame_;
+  const ShapeObservation& seen_;
+};
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+ShapeCost::ShapeCost(const ShapeFrame& frame, const ShapeObservation& observation)
+    : frame_(frame), seen_(observation) {
+  set_num_residuals(static_cast<int>(seen_.whitening.rows()));
+  mutable_parameter_block_sizes()->push_back(7);
+  mutable_parameter_block_sizes()->push_back(static_cast<int>(seen_.row.modes.cols()));
+  if (seen_.row.field.size() > 0) {
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(3 * seen_.row.field.size()));
+  }
+}
+
+bool ShapeCost::Evaluate(const double* const* parameters, double* residuals,
+                         double** jacobians) const {
+  const std::size_t modes = seen_.row.modes.cols(), field = 3 * seen_.row.field.size();
+  ShapeDerivatives derivatives;
+  const Vec3 x = PlacedPoint(frame_, seen_.row, {parameters[0], 7}, {parameters[1], modes},
+                             {field > 0 ? parameters[2] : nullptr, field}, &derivatives);
+  const Eigen::Index rows = seen_.whitening.rows();
+  Eigen::Map<Eigen::VectorXd>(residuals, rows) = seen_.whitening * (x - seen_.position);
+  if (jacobians == nullptr) {
+    return true;
+  }
+  RowMajor all(rows, 7 + modes + field);
+  for (Eigen::Index r = 0; r < rows; ++r) {
+    all.row(r) = DerivativeAlong(seen_.whitening.row(r).transpose(), seen_.row, derivatives);
+  }
+  Eigen::Index begin = 0;
+  for (std::size_t block = 0; block < parameter_block_sizes().size(); ++block) {
+    const int size = parameter_block_sizes()[block];
+    if (jacobians[block] != nullptr) {
+      Eigen::Map<RowMajor>(jacobians[block], rows, size) = all.middleCols(begin, size);
+    }
+    begin += size;
+  }
+  return true;
+}
 
 // ---------------------------------------------------------------------------------------------
 // Checks
@@ -67,10 +121,10 @@ void CheckTips(const ShapeModel& model, const ShapeTarget& target) {
 }
 
 // ---------------------------------------------------------------------------------------------
-// Points of the model that take part
+// Points of the model that are used
 // ---------------------------------------------------------------------------------------------
 
-// Numbers of at most `count` points that lie far apart, the first one first.
+// Indices of at most `count` points that lie far apart, beginning with point 0.
 std::vector<int> SpreadPoints(std::span<const Vec3> points, int count) {
   const std::vector<std::size_t> some =
       FarthestFirst(points, 0, static_cast<std::size_t>(count), Coincident::kLeftOut);
@@ -85,10 +139,10 @@ std::vector<Vec3> FeaturePositions(const ShapeTarget& target) {
   return positions;
 }
 
-// What the tips know of a point of the mean.
+// The tip nearest to a point of the mean.
 struct NearestTip {
-  double squared_mm = 0;    // to the nearest; 0 without tips
-  double shared_sd_mm = 0;  // of that
+  double squared_mm = 0;    // squared distance; 0 without tips
+  double shared_sd_mm = 0;  // ShapeTip::shared_sd_mm
 };
 
 NearestTip NearestTipTo(const Vec3& p, const ShapeModel& model, const ShapeTarget& target) {
@@ -104,8 +158,8 @@ NearestTip NearestTipTo(const Vec3& p, const ShapeModel& model, const ShapeTarge
   return nearest;
 }
 
-// How much less is known of a point far from all that was seen than the modes tell; 0 where nothing
-// was seen, for then the modes are all that is known.
+// The additional standard deviation of a point far from all observations, where the modes alone are
+// too confident. It is 0 without observations, because then the modes are the only information.
 double UnseenSd_mm(const Vec3& p, std::span<const ShapeObservation> seen,
                    const ShapeFitOptions& options) {
   if (seen.empty()) {
@@ -124,7 +178,7 @@ struct DrawnPoint {
   double shared_sd_mm = 0;  // ShapeTip::shared_sd_mm of the nearest tip
 };
 
-// Spread evenly over what is near a tip and clear of the features.
+// Points of the model that lie near a tip and away from the features, spread evenly.
 std::vector<DrawnPoint> DrawnPoints(const ShapeModel& model, const ShapeTarget& target,
                                     const ShapeFitOptions& options) {
   const double farthest = options.surface_range_mm * options.surface_range_mm;
@@ -170,11 +224,11 @@ class DrawingSurface {
 
   struct Foot {
     Vec3 position, normal;
-    double sd_mm;     // by which it weighs
-    double error_mm;  // by which it is off
+    double sd_mm;     // for the weight
+    double error_mm;  // for sigma
   };
-  // Where a point with this normal is drawn to, if anywhere.
-  std::optional<Foot> FootOf(const Vec3& p, const Vec3& normal) const {
+  // The foot of a point with this normal, if it is within reach and faces the same way.
+  std::optional<Foot> FindFoot(const Vec3& p, const Vec3& normal) const {
     const MeshPoint at = query_.Closest(p);
     const Triangle& t = mesh_.triangles[at.triangle];
     if (at.distance_mm > reach_mm_ ||
@@ -200,7 +254,7 @@ class DrawingSurface {
   }
 
   const TriMesh& mesh_;
-  std::span<const double> sd_mm_, error_mm_;  // one per point; none: the same everywhere
+  std::span<const double> sd_mm_, error_mm_;  // one per point; empty: otherwise_sd_mm_
   double otherwise_sd_mm_;
   std::vector<Vec3> normals_;
   std::vector<char> on_border_;
@@ -234,16 +288,18 @@ class ShapeEstimator {
 
   void Round(int round);
   ShapeEstimate Result(const RunContext& context);
-  bool Still(int round) const { return round > kFirstSurfaceRound && last_move_mm_ < kStillMm; }
+  bool HasConverged(int round) const {
+    return round > kFirstSurfaceRound && last_move_mm_ < kMoveTolerance_mm;
+  }
 
  private:
   void Place();
-  void SeeTips();
-  void SeeMarks();
-  void SeeSurface();
+  void ObserveTips();
+  void ObserveMarks();
+  void ObserveSurface();
   void Solve(bool pose_alone);
   void AddPriors(ceres::Problem& problem);
-  void TellSpread(const RunContext& context, ShapeEstimate& result) const;
+  void ComputeSpread(const RunContext& context, ShapeEstimate& result) const;
 
   const ShapeModel& model_;
   const ShapeTarget& target_;
@@ -256,8 +312,8 @@ class ShapeEstimator {
 
   ShapeParameters parameters_;
   std::array<double, 7> start_pose_;
-  TriMesh placed_;             // the shape as it stands
-  std::vector<Vec3> normals_;  // of its points
+  TriMesh placed_;             // the present shape
+  std::vector<Vec3> normals_;  // one per point of placed_
   std::vector<ShapeObservation> seen_;
   int surface_points_ = 0, rounds_ = 0;
   double last_move_mm_ = kNaN;
@@ -273,16 +329,16 @@ Vec3 NormalAt(const ModelPoint& at, const TriMesh& mesh, const std::vector<Vec3>
   return PositionOf(at, mesh, normals).normalized();
 }
 
-void ShapeEstimator::SeeTips() {
+void ShapeEstimator::ObserveTips() {
   for (const ShapeTip& tip : target_.tips) {
     const PointSpread spread{.normal = NormalAt(tip.at, model_.mean, normals_),
                              .normal_sd_mm = options_.tip_normal_sd_mm,
                              .tangent_sd_mm = options_.tip_tangent_sd_mm,
                              .direction = tip.direction,
                              .along_sd_mm = tip.along_sd_mm};
-    seen_.push_back({.row = RowAt(model_, field_, tip.at),
+    seen_.push_back({.row = PointRowAt(model_, field_, tip.at),
                      .position = tip.position,
-                     .whitening = WhiteningOf(spread),
+                     .whitening = MakeWhitening(spread),
                      .loss_width = options_.tip_loss_width,
                      .shared_mm = tip.shared_sd_mm * tip.direction});
   }
@@ -290,9 +346,9 @@ void ShapeEstimator::SeeTips() {
 
 ShapeRow MeanRow(const ShapeModel& model, const Eigen::MatrixXd& field,
                  const std::vector<ModelPoint>& at) {
-  ShapeRow mean = RowAt(model, field, at.front());
+  ShapeRow mean = PointRowAt(model, field, at.front());
   for (std::size_t k = 1; k < at.size(); ++k) {
-    const ShapeRow row = RowAt(model, field, at[k]);
+    const ShapeRow row = PointRowAt(model, field, at[k]);
     mean.mean += row.mean;
     mean.modes += row.modes;
     mean.field += row.field;
@@ -301,7 +357,7 @@ ShapeRow MeanRow(const ShapeModel& model, const Eigen::MatrixXd& field,
   return {mean.mean / count, mean.modes / count, mean.field / count};
 }
 
-void ShapeEstimator::SeeMarks() {
+void ShapeEstimator::ObserveMarks() {
   for (const ShapeMark& mark : target_.marks) {
     seen_.push_back({.row = MeanRow(model_, field_, mark.at),
                      .position = mark.position,
@@ -310,12 +366,12 @@ void ShapeEstimator::SeeMarks() {
   }
 }
 
-void ShapeEstimator::SeeSurface() {
+void ShapeEstimator::ObserveSurface() {
   surface_points_ = 0;
   const double weight = options_.surface_worth / options_.surface_points;
   for (const auto& [v, shared_sd_mm] : drawn_) {
-    if (const auto foot = surface_->FootOf(placed_.points[v], normals_[v])) {
-      seen_.push_back({.row = RowOfVertex(model_, field_, v),
+    if (const auto foot = surface_->FindFoot(placed_.points[v], normals_[v])) {
+      seen_.push_back({.row = VertexRow(model_, field_, v),
                        .position = foot->position,
                        .whitening = foot->normal.transpose() / foot->sd_mm,
                        .loss_width = options_.surface_loss_width,
@@ -363,14 +419,14 @@ void ShapeEstimator::Solve(bool pose_alone) {
   }
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  solver.max_num_iterations = 4;  // what is seen changes with the next round
+  solver.max_num_iterations = 4;  // the observations change with the next round
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
   usable_ = usable_ && summary.IsSolutionUsable();
 }
 
-// The largest distance between the observed points of two rounds.
+// The largest distance between the points of two rounds.
 double LargestMove(const std::vector<Vec3>& before, const std::vector<Vec3>& after) {
   double most = 0;
   for (std::size_t v = 0; v < before.size(); ++v) {
@@ -382,10 +438,10 @@ double LargestMove(const std::vector<Vec3>& before, const std::vector<Vec3>& aft
 void ShapeEstimator::Round(int round) {
   Place();
   seen_.clear();
-  SeeTips();
-  SeeMarks();
+  ObserveTips();
+  ObserveMarks();
   if (surface_ && round >= kFirstSurfaceRound) {
-    SeeSurface();
+    ObserveSurface();
   }
   Solve(round < kPoseRounds);
   last_move_mm_ = LargestMove(placed_.points, PlacedPoints(frame_, model_, field_, parameters_));
@@ -396,14 +452,14 @@ double Rms(const Eigen::MatrixXd& rows) {
   return rows.size() == 0 ? 0 : std::sqrt(rows.rowwise().squaredNorm().mean());
 }
 
-// Sigma, and what is drawn.
-void ShapeEstimator::TellSpread(const RunContext& context, ShapeEstimate& result) const {
+// Computes sigma and the drawn shapes.
+void ShapeEstimator::ComputeSpread(const RunContext& context, ShapeEstimate& result) const {
   std::vector<ShapeRow> rows;
   for (int v = 0; v < static_cast<int>(model_.mean.points.size()); ++v) {
-    rows.push_back(RowOfVertex(model_, field_, v));
+    rows.push_back(VertexRow(model_, field_, v));
   }
   const ShapePosterior posterior =
-      PosteriorOf(frame_, parameters_, seen_, prior_, options_.surface_length_mm);
+      MakePosterior(frame_, parameters_, seen_, prior_, options_.surface_length_mm);
   result.sigma_mm =
       DeviationsAlong(frame_, parameters_, posterior, rows, normals_, context.threads);
   for (std::size_t v = 0; v < result.sigma_mm.size(); ++v) {
@@ -412,18 +468,18 @@ void ShapeEstimator::TellSpread(const RunContext& context, ShapeEstimate& result
   }
   for (const std::uint64_t random_seed : target_.draws) {
     result.drawn.push_back(
-        PlacedPoints(frame_, model_, field_, DrawnAbout(parameters_, posterior, random_seed)));
+        PlacedPoints(frame_, model_, field_, DrawParameters(parameters_, posterior, random_seed)));
   }
 }
 
 ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
   Place();
   ShapeEstimate result;
-  result.subject_from_model = SimilarityOf(frame_, parameters_);
+  result.subject_from_model = MakeSimilarity(frame_, parameters_);
   result.coefficients = parameters_.coefficients;
   result.points = placed_.points;
   if (target_.tells_spread) {
-    TellSpread(context, result);
+    ComputeSpread(context, result);
   }
   for (const ShapeTip& tip : target_.tips) {
     result.tip_residual_mm.push_back(
@@ -454,7 +510,7 @@ ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,
   CheckShapeModel(model, "shape model");
   CheckTips(model, target);
   ShapeEstimator estimator(model, target, options);
-  for (int round = 0; round < options.rounds && !estimator.Still(round); ++round) {
+  for (int round = 0; round < options.rounds && !estimator.HasConverged(round); ++round) {
     context.ThrowIfStopped();
     context.Report("shape", fmt::format("round {} of at most {}", round + 1, options.rounds));
     estimator.Round(round);

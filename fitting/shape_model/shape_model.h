@@ -1,39 +1,101 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A statistical model of a shape: a mean mesh, and the modes in which the shapes of a population
-// differ from it (Cootes et al. 1995; Blanz & Vetter 1999).
+// differ from it (Cootes et al. 1995; Blanz & Vetter 1999). The unknowns of a shape's estimate
+// place a point of the model at
+//
+//   x = s R (mean + modes w + field a - centre) + t,   R = exp(omega) start_rotation,
+//
+// with the pose (ln s, omega, t), the coefficients w of the modes and a of the smooth field.
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <span>
 #include <string_view>
 #include <vector>
 
+#include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 
 struct ShapeModel {
-  TriMesh mean;           // n points, mm, outward
-  Eigen::MatrixXd modes;  // 3n x k, mm at coefficient 1: rows 3v, 3v+1, 3v+2 are x, y, z of point v
+  TriMesh mean;           // n points, mm; triangles face outward
+  Eigen::MatrixXd modes;  // 3n x k, mm per coefficient; rows 3v .. 3v+2 are x, y, z of point v
 
   Eigen::Index Modes() const { return modes.cols(); }
 };
 
-// A point on the model's mesh: the weighted sum of the corners of a triangle.
+// A point on the model's mesh: a weighted sum of the corners of a triangle.
 struct ModelPoint {
   int triangle = -1;
   Vec3 weights = Vec3::Constant(kNaN);  // sum 1
 };
 
-// name: of the model, for messages. Throws InputError in one line that starts with `name`: no
-// triangle or no mode, a number of rows that is not three times that of the points, a corner that
-// is no point, or a value that is not finite.
+// Throws InputError, with a message that starts with `name`, if the model has no triangle or no
+// mode, if the modes do not have three rows per point, if a corner is not a point, or if a value is
+// not finite.
 void CheckShapeModel(const ShapeModel& model, std::string_view name);
 
-// The points of the shape with these coefficients, which are independent N(0,1) over the
-// population: mean + modes * coefficients. Throws InputError if they are not one per mode.
+// The points mean + modes * coefficients of a shape. Over the population the coefficients are
+// independent N(0,1). Throws InputError if there is not one per mode.
 std::vector<Vec3> ShapeAt(const ShapeModel& model, const Eigen::VectorXd& coefficients);
 
-// The place of a model point on a shape. points: one per point of the mean.
+// The position of a model point on a shape. points: one per point of the mean.
 Vec3 PositionOf(const ModelPoint& at, const TriMesh& mean, const std::vector<Vec3>& points);
+
+// The fixed part of the pose. It lies near the solution, so that omega and t are well conditioned.
+struct ShapeFrame {
+  Mat3 start_rotation = Mat3::Identity();
+  Vec3 centre = Vec3::Zero();  // the model's centre, mm
+};
+
+struct ShapeParameters {
+  std::array<double, 7> pose = {};  // ln s, omega (3, rad), t (3, mm)
+  Eigen::VectorXd coefficients;     // k, N(0,1)
+  Eigen::VectorXd field;            // 3m, N(0,1): x, y, z of centre 0, of centre 1 ...
+
+  Eigen::Index size() const { return 7 + coefficients.size() + field.size(); }
+};
+
+// The matrix that maps w to v x w.
+Mat3 CrossMatrix(const Vec3& v);
+
+// The parameters of the mean shape under a similarity.
+ShapeParameters StartParameters(const ShapeFrame& frame, const Similarity& subject_from_model,
+                                Eigen::Index modes, Eigen::Index centres);
+// The frame in which omega starts at 0.
+ShapeFrame StartFrame(const ShapeModel& model, const Similarity& subject_from_model);
+// subject_from_model at these parameters.
+Similarity MakeSimilarity(const ShapeFrame& frame, const ShapeParameters& parameters);
+
+// The model's rows for one point.
+struct ShapeRow {
+  Vec3 mean = Vec3::Constant(kNaN);
+  Eigen::Matrix3Xd modes;    // 3 x k
+  Eigen::RowVectorXd field;  // m: the row of SmoothFieldFactor
+};
+// field: n x m, one row per point of the model.
+ShapeRow PointRowAt(const ShapeModel& model, const Eigen::MatrixXd& field, const ModelPoint& at);
+ShapeRow VertexRow(const ShapeModel& model, const Eigen::MatrixXd& field, int vertex);
+
+// Derivatives of a placed point. The derivatives by w and a follow from `linear`.
+struct ShapeDerivatives {
+  Eigen::Matrix<double, 3, 7> pose;
+  Eigen::Matrix3d linear;  // by the unplaced point: s R
+};
+Vec3 PlacedPoint(const ShapeFrame& frame, const ShapeRow& row, std::span<const double> pose,
+                 std::span<const double> coefficients, std::span<const double> field,
+                 ShapeDerivatives* derivatives = nullptr);
+Vec3 PlacedPoint(const ShapeFrame& frame, const ShapeRow& row, const ShapeParameters& parameters,
+                 ShapeDerivatives* derivatives = nullptr);
+
+// The derivatives direction' dx / d(pose, w, a): 7 + k + 3m values.
+Eigen::RowVectorXd DerivativeAlong(const Vec3& direction, const ShapeRow& row,
+                                   const ShapeDerivatives& derivatives);
+
+// The placed positions of all points of the model.
+std::vector<Vec3> PlacedPoints(const ShapeFrame& frame, const ShapeModel& model,
+                               const Eigen::MatrixXd& field, const ShapeParameters& parameters);
 
 }  // namespace semblance

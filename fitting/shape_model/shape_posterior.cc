@@ -9,19 +9,33 @@
 #include "surfaces/base/random.h"
 
 namespace semblance {
+
+Eigen::Matrix3d MakeWhitening(const PointSpread& s) {
+  const auto square = [](double x) { return x * x; };
+  const Mat3 along_normal = s.normal * s.normal.transpose();
+  const Mat3 covariance = square(s.normal_sd_mm) * along_normal +
+                          square(s.tangent_sd_mm) * (Mat3::Identity() - along_normal) +
+                          square(s.along_sd_mm) * s.direction * s.direction.transpose();
+  return covariance.llt().matrixL().solve(Mat3::Identity());
+}
+
+double LossWeight(const ShapeObservation& seen, const Vec3& placed) {
+  const double residual = (seen.whitening * (placed - seen.position)).norm();
+  return residual <= seen.loss_width ? 1 : seen.loss_width / residual;
+}
 namespace {
 
-// The observations' rows, each at the root of its weight.
+// The observations' rows, each times the root of its weight.
 struct SeenRows {
-  Eigen::MatrixXd jacobian;  // of what is weighed
-  Eigen::VectorXd shared;    // one standard deviation of the error that all share
-  std::vector<Eigen::Index> smooth;
-  std::vector<Vec3> smooth_at;    // of those, mm
-  std::vector<double> smooth_sd;  // of those, in the units of the rows
+  Eigen::MatrixXd jacobian;
+  Eigen::VectorXd shared;            // one standard deviation of the shared error
+  std::vector<Eigen::Index> smooth;  // rows with a smooth error
+  std::vector<Vec3> smooth_at;       // their positions, mm
+  std::vector<double> smooth_sd;     // their deviations, in the units of the rows
 };
 
-SeenRows RowsOf(const ShapeFrame& frame, const ShapeParameters& parameters,
-                std::span<const ShapeObservation> seen) {
+SeenRows MakeRows(const ShapeFrame& frame, const ShapeParameters& parameters,
+                  std::span<const ShapeObservation> seen) {
   Eigen::Index count = 0, row = 0;
   for (const ShapeObservation& one : seen) {
     count += one.whitening.rows();
@@ -45,8 +59,8 @@ SeenRows RowsOf(const ShapeFrame& frame, const ShapeParameters& parameters,
   return rows;
 }
 
-// J' E J, E the covariance of the rows' errors but for the part that all share.
-Eigen::MatrixXd SpreadOf(const SeenRows& rows, double length_mm) {
+// J' E J, where E is the covariance of the rows' errors without the shared part.
+Eigen::MatrixXd GradientSpread(const SeenRows& rows, double length_mm) {
   const Eigen::Index count = std::ssize(rows.smooth);
   Eigen::MatrixXd alone = rows.jacobian, smooth(count, rows.jacobian.cols()), errors(count, count);
   for (Eigen::Index j = 0; j < count; ++j) {
@@ -72,12 +86,12 @@ Eigen::VectorXd ShapePrior::Deviations(const ShapeParameters& parameters) const 
   return deviations;
 }
 
-ShapePosterior PosteriorOf(const ShapeFrame& frame, const ShapeParameters& parameters,
-                           std::span<const ShapeObservation> seen, const ShapePrior& prior,
-                           double smooth_length_mm) {
-  const SeenRows rows = RowsOf(frame, parameters, seen);
+ShapePosterior MakePosterior(const ShapeFrame& frame, const ShapeParameters& parameters,
+                             std::span<const ShapeObservation> seen, const ShapePrior& prior,
+                             double smooth_length_mm) {
+  const SeenRows rows = MakeRows(frame, parameters, seen);
   ShapePosterior posterior{rows.jacobian.transpose() * rows.jacobian,
-                           SpreadOf(rows, smooth_length_mm)};
+                           GradientSpread(rows, smooth_length_mm)};
   const Eigen::VectorXd shared = rows.jacobian.transpose() * rows.shared;
   posterior.spread += shared * shared.transpose();
   Eigen::VectorXd pull = prior.Deviations(parameters).array().inverse().square();
@@ -91,7 +105,7 @@ ShapePosterior PosteriorOf(const ShapeFrame& frame, const ShapeParameters& param
 std::vector<double> DeviationsAlong(const ShapeFrame& frame, const ShapeParameters& parameters,
                                     const ShapePosterior& posterior, std::span<const ShapeRow> rows,
                                     std::span<const Vec3> directions, int threads) {
-  constexpr std::size_t kBlock = 128;  // columns that are solved for at once
+  constexpr std::size_t kBlock = 128;  // right-hand sides per solve; bounds the memory
   const Eigen::LLT<Eigen::MatrixXd> factor(posterior.information);
   std::vector<double> deviations(rows.size(), kNaN);
   ParallelFor((rows.size() + kBlock - 1) / kBlock, threads, 1, [&](std::size_t block) {
@@ -111,8 +125,8 @@ std::vector<double> DeviationsAlong(const ShapeFrame& frame, const ShapeParamete
   return deviations;
 }
 
-ShapeParameters DrawnAbout(const ShapeParameters& parameters, const ShapePosterior& posterior,
-                           std::uint64_t random_seed) {
+ShapeParameters DrawParameters(const ShapeParameters& parameters, const ShapePosterior& posterior,
+                               std::uint64_t random_seed) {
   Random random(random_seed);
   Eigen::VectorXd pull(parameters.size());
   for (double& value : pull) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A smooth random displacement of a shape, for what its modes cannot express: a Gaussian process
-// over the mean shape (Luethi et al. 2018), of low rank.
+// A smooth random displacement of a shape that its modes cannot express: a Gaussian process over
+// the mean shape (Luethi et al. 2018), of low rank.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,21 +12,21 @@
 namespace semblance {
 
 struct SmoothFieldOptions {
-  int centres = 110;             // points that span the field; 0: no field
-  double wide_sd_mm = 2;         // of its wide part
-  double wide_length_mm = 45;    // over which that resembles itself
-  double fine_sd_mm = 1;         // of its fine part
-  double fine_length_mm = 20;    // over which that resembles itself
-  double at_features = 0.5;      // factor at nose, mouth and eyes
-  double feature_reach_mm = 15;  // where the factor has risen to 1
+  int centres = 110;
+  double wide_sd_mm = 2;
+  double wide_length_mm = 45;
+  double fine_sd_mm = 1;
+  double fine_length_mm = 20;
+  double at_features = 0.5;
+  double feature_reach_mm = 15;
 };
 template <class Visitor>
 void Fields(Visitor& visit, SmoothFieldOptions& o) {
   visit(FieldInfo{.name = "centres",
                   .min = 0,
                   .max = 1000,
-                  .doc = "points that span the field, each with three coordinates; more follow "
-                         "smaller details; 0: no field, the modes alone"},
+                  .doc = "number of points that span the field; more follow smaller details; 0: no "
+                         "field, the modes alone"},
         o.centres);
   visit(FieldInfo{.name = "wide_sd_mm",
                   .unit = "mm",
@@ -38,7 +38,7 @@ void Fields(Visitor& visit, SmoothFieldOptions& o) {
                   .unit = "mm",
                   .min = 1,
                   .max = 500,
-                  .doc = "length over which the wide part resembles itself"},
+                  .doc = "correlation length of the wide part"},
         o.wide_length_mm);
   visit(FieldInfo{.name = "fine_sd_mm",
                   .unit = "mm",
@@ -50,27 +50,27 @@ void Fields(Visitor& visit, SmoothFieldOptions& o) {
                   .unit = "mm",
                   .min = 1,
                   .max = 500,
-                  .doc = "length over which the fine part resembles itself"},
+                  .doc = "correlation length of the fine part"},
         o.fine_length_mm);
   visit(FieldInfo{.name = "at_features",
                   .min = 0,
                   .max = 1,
-                  .doc = "factor of the field at nose, mouth and eyes, where the modes know more "
-                         "than the bone does"},
+                  .doc = "factor of the field at nose, mouth and eyes, where the modes predict the "
+                         "shape better than the bone"},
         o.at_features);
   visit(FieldInfo{.name = "feature_reach_mm",
                   .unit = "mm",
                   .min = 0.1,
                   .max = 200,
-                  .doc = "distance from the features at which that factor has risen to 1"},
+                  .doc = "distance from the features at which the factor reaches 1"},
         o.feature_reach_mm);
 }
 
-// F, points x centres, such that F F' is nearly, and never more than, the covariance of one
-// coordinate of the field:
-//   cov(p, q) = alpha(p) alpha(q) (wide^2 exp(-d^2 / 2 wide_length^2) + fine^2 exp(..)), d = |p -
-//   q|, alpha(p) = at_features at a feature, rising in proportion to 1 at feature_reach_mm from it.
-// The projection on the centres (Nystroem). centres: indices into points; features: positions, mm.
+// The matrix F, points x centres, for which F F' approximates from below the covariance of one
+// coordinate of the field (Nystroem projection on the centres):
+//   cov(p, q) = alpha(p) alpha(q) (wide^2 exp(-d^2 / 2 wide_length^2) + the same for fine),
+// where d = |p - q|, and alpha(p) rises linearly from at_features at a feature to 1 at
+// feature_reach_mm from it. centres: indices into points; features: positions, mm.
 Eigen::MatrixXd SmoothFieldFactor(std::span<const Vec3> points, std::span<const int> centres,
                                   std::span<const Vec3> features,
                                   const SmoothFieldOptions& options);

@@ -12,10 +12,9 @@
 #include <set>
 #include <utility>
 
-#include "fitting/least_squares/cross_validation_score.h"
+#include "fitting/least_squares/cross_validation.h"
 #include "fitting/least_squares/patch_energy.h"
 #include "fitting/least_squares/sparse_factor.h"
-#include "fitting/least_squares/trace_probes.h"
 #include "fitting/solve/space_system.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
@@ -41,9 +40,9 @@ HSplineSurface EmptyLike(const HSplineSurface& surface) {
 
 namespace {
 
-constexpr int kTogether = 3;  // columns of a surface
+constexpr int kColumnsPerSurface = 3;  // columns of a surface
 
-// Columns that are points of one space.
+// Up to three columns as the coordinates of points in one space.
 struct ColumnGroup {
   ColumnGroup(const HSplineSurface& empty, const std::vector<Observation>& points)
       : cloud(empty.shape(), points), space(empty, empty, cloud) {}
@@ -51,13 +50,13 @@ struct ColumnGroup {
   HierarchicalSplineSpace space;
 };
 
-// A column less its mean, in units of its standard deviation.
+// The scale of a column: values are fitted as (value - mean) / sd.
 struct ColumnScale {
   double mean = 0, sd = 1;
 };
 
-ColumnScale ScaleOf(const AttributeColumns& points, std::span<const double> values,
-                    const std::vector<std::uint32_t>& used) {
+ColumnScale ComputeScale(const AttributeColumns& points, std::span<const double> values,
+                         const std::vector<std::uint32_t>& used) {
   double sum = 0, squares = 0, weights = 0;
   for (const std::uint32_t k : used) {
     sum += points.Weight(k) * values[k];
@@ -71,7 +70,7 @@ ColumnScale ScaleOf(const AttributeColumns& points, std::span<const double> valu
   return {.mean = mean, .sd = sd > 0 ? sd : 1};
 }
 
-// What is tried of one weight.
+// The result of one weight.
 struct WeightTrial {
   Eigen::MatrixXd values;      // unknowns x columns
   std::vector<double> scores;  // of each column
@@ -87,9 +86,9 @@ class AttributeSolver {
         used_(std::move(used)),
         empty_(EmptyLike(surface)) {
     for (const std::span<const double>& column : values_) {
-      scales_.push_back(ScaleOf(points_, column, used_));
+      scales_.push_back(ComputeScale(points_, column, used_));
     }
-    for (std::size_t first = 0; first < values_.size(); first += kTogether) {
+    for (std::size_t first = 0; first < values_.size(); first += kColumnsPerSurface) {
       groups_.push_back(std::make_unique<ColumnGroup>(empty_, Observations(first)));
       groups_.back()->space.Measure({}, /*threads=*/1, nullptr);
     }
@@ -132,7 +131,7 @@ class AttributeSolver {
     observations.reserve(used_.size());
     for (const std::uint32_t k : used_) {
       Observation o{.uv = points_.uv[k], .position = Vec3::Zero(), .weight = points_.Weight(k)};
-      for (std::size_t c = first; c < std::min(first + kTogether, values_.size()); ++c) {
+      for (std::size_t c = first; c < std::min(first + kColumnsPerSurface, values_.size()); ++c) {
         o.position[static_cast<Eigen::Index>(c - first)] =
             (values_[c][k] - scales_[c].mean) / scales_[c].sd;
       }
@@ -151,16 +150,16 @@ class AttributeSolver {
     right_.resize(space.rows(), static_cast<Eigen::Index>(values_.size()));
     for (std::size_t c = 0; c < values_.size(); ++c) {
       right_.col(static_cast<Eigen::Index>(c)) =
-          Assemble(groups_[c / kTogether]->space, scale, {}, SystemPart::kRight)
-              .right.col(static_cast<Eigen::Index>(c % kTogether));
+          Assemble(groups_[c / kColumnsPerSurface]->space, scale, {}, SystemPart::kRight)
+              .right.col(static_cast<Eigen::Index>(c % kColumnsPerSurface));
     }
-    constexpr int kProbes = 16;
+    constexpr int kProbes = 16;  // of the trace: time against accuracy
     probes_ = TraceProbes(points_part_.rows(), kProbes);
     influenced_ = points_part_.selfadjointView<Eigen::Lower>() * probes_.directions();
   }
 
   WeightTrial Try(double weight) {
-    constexpr double kShift = 1e-11;
+    constexpr double kShift = 1e-11;  // keeps the factor usable; small against the diagonal's mean
     WeightTrial trial{.values = {}, .scores = std::vector<double>(values_.size(), kNaN)};
     const SparseMatrix lower = points_part_ + weight * energy_;
     const SparseFactor factor(lower, kShift * std::max(lower.diagonal().mean(), 1e-300));
@@ -168,7 +167,7 @@ class AttributeSolver {
       return trial;
     }
     trial.values = factor.Solve(right_);
-    trial.trace = probes_.TraceOf(factor.Solve(influenced_));
+    trial.trace = probes_.Estimate(factor.Solve(influenced_));
     const Eigen::MatrixXd product = points_part_.selfadjointView<Eigen::Lower>() * trial.values;
     for (std::size_t c = 0; c < values_.size(); ++c) {
       const auto column = static_cast<Eigen::Index>(c);
@@ -194,7 +193,7 @@ class AttributeSolver {
   AttributeFit Result() {
     AttributeFit fit;
     for (std::size_t g = 0; g < groups_.size(); ++g) {
-      fit.surfaces.push_back(SurfaceOf(g));
+      fit.surfaces.push_back(MakeSurface(g));
     }
     for (const Best& best : best_) {
       fit.columns.push_back({.weight = best.weight, .degrees_of_freedom = best.trace});
@@ -202,13 +201,14 @@ class AttributeSolver {
     return fit;
   }
 
-  // In the columns' own units.
-  HSplineSurface SurfaceOf(std::size_t g) {
+  // The surface of column group g, in the columns' own units.
+  HSplineSurface MakeSurface(std::size_t g) {
     HierarchicalSplineSpace& space = groups_[g]->space;
     ControlNet unknowns = space.Values();
     Vec3 mean = Vec3::Zero();
-    for (std::size_t c = g * kTogether; c < std::min((g + 1) * kTogether, values_.size()); ++c) {
-      const auto at = static_cast<Eigen::Index>(c % kTogether);
+    for (std::size_t c = g * kColumnsPerSurface;
+         c < std::min((g + 1) * kColumnsPerSurface, values_.size()); ++c) {
+      const auto at = static_cast<Eigen::Index>(c % kColumnsPerSurface);
       mean[at] = scales_[c].mean;
       for (Eigen::Index row = 0; row < best_[c].values.size(); ++row) {
         unknowns.vertices[static_cast<std::size_t>(row)][at] = scales_[c].sd * best_[c].values[row];
@@ -262,7 +262,7 @@ void CheckColumns(const AttributeColumns& points) {
   }
 }
 
-// Of the points that count.
+// Sets the columns' rms over the used points.
 void MeasureColumns(const AttributeColumns& points, std::span<const std::uint32_t> used,
                     int threads, AttributeFit& fit) {
   const std::vector<std::vector<double>> fitted = fit.At(points.uv, threads);
@@ -281,9 +281,9 @@ void MeasureColumns(const AttributeColumns& points, std::span<const std::uint32_
 
 std::vector<std::vector<double>> AttributeFit::At(std::span<const Vec2> uv, int threads) const {
   std::vector<std::vector<double>> values;
-  for (std::size_t c = 0; c < columns.size(); c += kTogether) {
-    const std::vector<Vec3> at = HSplineBatch(surfaces[c / kTogether]).Points(uv, threads);
-    for (std::size_t k = c; k < std::min(c + kTogether, columns.size()); ++k) {
+  for (std::size_t c = 0; c < columns.size(); c += kColumnsPerSurface) {
+    const std::vector<Vec3> at = HSplineBatch(surfaces[c / kColumnsPerSurface]).Points(uv, threads);
+    for (std::size_t k = c; k < std::min(c + kColumnsPerSurface, columns.size()); ++k) {
       std::vector<double>& column = values.emplace_back();
       column.reserve(at.size());
       for (const Vec3& p : at) {

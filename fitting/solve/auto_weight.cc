@@ -7,20 +7,19 @@
 #include <cmath>
 #include <map>
 
-#include "fitting/least_squares/cross_validation_score.h"
+#include "fitting/least_squares/cross_validation.h"
 #include "fitting/least_squares/sparse_factor.h"
-#include "fitting/least_squares/trace_probes.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
 
-constexpr int kProbes = 32;
-constexpr int kRoughProbes = 8;  // to find the decade
+// Probes of the trace's estimate: time against accuracy. The decade needs a rough score only.
+constexpr int kProbes = 32, kRoughProbes = 8;
 
 class WeightSearch {
  public:
-  // probes: of the trace, if it is not taken exactly.
+  // probes: number of probes if the trace is estimated.
   WeightSearch(const WeightProblem& problem, int probes)
       : problem_(problem), probes_(problem.points.lower.rows(), probes) {
     influenced_ = problem.points.lower.selfadjointView<Eigen::Lower>() * probes_.directions();
@@ -56,7 +55,7 @@ class WeightSearch {
     const double misfit =
         problem_.misfit - 2 * step.cwiseProduct(problem_.points.right).sum() +
         step.cwiseProduct(problem_.points.lower.selfadjointView<Eigen::Lower>() * step).sum();
-    const double trace = probes_.TraceOf(factor.Solve(influenced_));
+    const double trace = probes_.Estimate(factor.Solve(influenced_));
     return {.weight = weight,
             .score = CrossValidationScore(misfit, trace, problem_.count),
             .degrees_of_freedom = trace};
@@ -69,10 +68,10 @@ class WeightSearch {
   WeightChoice best_;
 };
 
-// The best decade, from smooth to rough until the score has plainly turned: where points are many,
-// rougher is dearer to try and no longer in question.
+// Finds the best decade, from smooth to rough. It stops after two scores that clearly exceed the
+// best one, because rougher weights cost more time and cannot be better.
 double BestDecade(const WeightProblem& problem, double near) {
-  constexpr double kTurned = 1.05;
+  constexpr double kTurned = 1.05;  // exceeds the errors of the rough scores
   WeightSearch search(problem, kRoughProbes);
   const double even = problem.points.lower.diagonal().sum() /
                       std::max(problem.smooth.lower.diagonal().sum(), 1e-300);
@@ -84,14 +83,14 @@ double BestDecade(const WeightProblem& problem, double near) {
   return search.best().weight;
 }
 
-// The smoothest that the points do not tell from the best: the score is flat, and in a gap, of
-// which no point knows, the rougher ones swing.
-WeightChoice SmoothestAsGood(WeightSearch& search) {
-  constexpr double kAsGood = 1.01;
+// Returns the largest weight whose score is within 1 % of the best. The score is flat there, and in
+// gaps without points a rougher surface oscillates.
+WeightChoice SmoothestNearBest(WeightSearch& search) {
+  constexpr double kScoreRatio = 1.01;  // larger: smoother gaps, but a worse fit to the points
   WeightChoice choice = search.best();
   for (int k = 0; k < 12; ++k) {
     const WeightChoice next = search.Try(choice.weight * std::sqrt(std::sqrt(10.0)));
-    if (!(next.score <= kAsGood * search.best().score)) {
+    if (!(next.score <= kScoreRatio * search.best().score)) {
       break;
     }
     choice = next;
@@ -113,7 +112,7 @@ WeightChoice ChooseWeight(const WeightProblem& problem, double near) {
     search.Try(middle * factor);
     search.Try(middle / factor);
   }
-  return SmoothestAsGood(search);
+  return SmoothestNearBest(search);
 }
 
 int AutoTerm(std::span<const Term> terms) {

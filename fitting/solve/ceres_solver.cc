@@ -11,22 +11,25 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <optional>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "fitting/least_squares/qr_compression.h"
 #include "fitting/least_squares/sparse_factor.h"
+#include "fitting/terms/tangent_points.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/lower_case.h"
 
 namespace semblance {
 namespace {
 
-constexpr int kMaxIterations = 50;
-constexpr double kStepTolerance = 1e-13;  // of the norm of all vertices
+constexpr int kMaxIterations = 50;        // determined directions need two or three
+constexpr double kStepTolerance = 1e-13;  // relative to the norm of all vertices; round-off
 
-// What the eigenvalues of the normal equations are measured by: residuals are means over points or
-// vertices, so a vertex that is well held has about weight / vertices on the diagonal.
+// The typical eigenvalue of the normal equations. Residuals are means over points or vertices, so a
+// well-determined vertex has about weight / vertices on the diagonal.
 double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {
   double sum = 0;
   for (const Term& term : terms) {
@@ -36,15 +39,17 @@ double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {
   return sum / static_cast<double>(vertices);
 }
 
-// Of the trust region.
+// The radius of the trust region: the damping 1 / radius is 1e-8 of the typical stiffness, small
+// against determined directions and large against round-off.
 double Radius(std::span<const Term> terms, std::size_t vertices) {
   return std::min(1e8 / TypicalStiffness(terms, vertices), 1e16);
 }
 
-// Ceres damps by D / radius with D clamped to [min, max]; both at 1 give the identity, and a fixed
-// radius the proximal-point iteration x <- argmin cost(y) + |y - x|^2 / radius, which goes to the
-// least-squares solution nearest to the start. Damping by the diagonal, Ceres' default, would
-// instead move the least-held vertices most. Determined directions converge in two or three steps.
+// Ceres damps by D / radius with D clamped to [min, max]. With both at 1, D is the identity, and a
+// fixed radius gives the proximal-point iteration x <- argmin cost(y) + |y - x|^2 / radius, which
+// converges to the least-squares solution nearest to the start. Ceres' default, damping by the
+// diagonal, would instead move weakly determined vertices most. Determined directions converge in
+// two or three steps.
 ceres::Solver::Options CeresOptions(std::span<const Term> terms, std::size_t vertices) {
   UseOneLibraryThread();
   ceres::Solver::Options options;
@@ -58,17 +63,17 @@ ceres::Solver::Options CeresOptions(std::span<const Term> terms, std::size_t ver
   options.max_trust_region_radius = options.initial_trust_region_radius;
   options.max_num_iterations = kMaxIterations;
   options.function_tolerance = 1e-15;
-  options.gradient_tolerance = 0;  // blind to weakly determined directions
+  options.gradient_tolerance = 0;  // the gradient is tiny along weakly determined directions
   options.parameter_tolerance = kStepTolerance;
   return options;
 }
 
-// A step is rejected although it changes the cost by no more than rounding does: there is nothing
-// left to gain, and shorter steps would be rejected likewise, each with a factor of its own.
+// Stops if a step is rejected whose change of the cost is round-off. Nothing is left to gain, and
+// Ceres would try shorter steps, each with its own factor.
 class StopAtRounding final : public ceres::IterationCallback {
  public:
   ceres::CallbackReturnType operator()(const ceres::IterationSummary& step) override {
-    constexpr double kRounding = 1e-13;
+    constexpr double kRounding = 1e-13;  // of the cost, a sum of many squares
     const bool rounding = step.iteration > 0 && step.step_is_valid && !step.step_is_successful &&
                           std::abs(step.cost_change) <= kRounding * step.cost;
     return rounding ? ceres::SOLVER_TERMINATE_SUCCESSFULLY : ceres::SOLVER_CONTINUE;
@@ -77,24 +82,23 @@ class StopAtRounding final : public ceres::IterationCallback {
 
 std::string TerminationName(ceres::TerminationType type) {
   if (type == ceres::USER_SUCCESS) {
-    return "convergence";  // by StopAtRounding
+    return "convergence";  // StopAtRounding
   }
   return LowerCase(ceres::TerminationTypeToString(type));
 }
 
-constexpr int kSide = 3, kTile = kSide * kSide;
+constexpr int kSide = 3, kTile = kSide * kSide;  // vertices of a tile: dense blocks of useful size
 
-// Of all residuals. Ceres stops where the vertices less their gradient are the vertices again, to
-// the last digit; in these units the gradient is larger by the square.
+// Factor of all residuals. Ceres stops if subtracting the gradient from the vertices changes no
+// digit; the factor makes the gradient larger by its square, so that Ceres does not stop too early.
 constexpr double kScale = 1e4;
 
 struct Slot {
-  int tile = -1;   // of all; in a block of rows: which of its tiles
-  int place = -1;  // in the tile
+  int tile = -1;   // index among all tiles, or among the tiles of a block of rows
+  int place = -1;  // place in the tile
 };
 
-// The tiles of 3 x 3 vertices of one level that hold the dofs. Places of vertices that are none
-// stay empty.
+// The tiles of 3 x 3 vertices of one level that contain the dofs. Places without a dof stay empty.
 class Tiles {
  public:
   explicit Tiles(const LevelView& view) {
@@ -119,11 +123,11 @@ class Tiles {
                                  : VertexId{0, dof % columns, dof / columns};
   }
 
-  std::vector<Slot> slots_;  // of each dof
+  std::vector<Slot> slots_;  // one per dof
   int count_ = 0;
 };
 
-// A X - B over some dofs; their tiles and where each column is in them.
+// Rows A X - B over some dofs, with their tiles and the slot of each column.
 struct TileRows {
   std::shared_ptr<const Eigen::MatrixXd> a;
   Rows3 b;
@@ -131,7 +135,7 @@ struct TileRows {
   std::vector<Slot> columns;
 };
 
-// One coordinate of TileRows.
+// The residual of TileRows for one coordinate.
 class BlockedLinearCost final : public ceres::CostFunction {
  public:
   BlockedLinearCost(std::shared_ptr<const TileRows> rows, int coordinate)
@@ -166,7 +170,7 @@ class BlockedLinearCost final : public ceres::CostFunction {
   int coordinate_;
 };
 
-// Keeps the rows of all terms, those of a patch reduced to at most sixteen.
+// Collects the rows of all terms, compressed to at most sixteen per patch.
 class BlockedRowSink final : public RowSink {
  public:
   explicit BlockedRowSink(const Tiles& tiles) : tiles_(tiles), touched_(tiles.slots().size()) {}
@@ -197,7 +201,7 @@ class BlockedRowSink final : public RowSink {
 
  private:
   const Tiles& tiles_;
-  std::vector<char> touched_;  // dofs
+  std::vector<char> touched_;  // per dof, whether some row has a non-zero column for it
   std::vector<std::shared_ptr<const TileRows>> rows_;
 };
 
@@ -275,6 +279,201 @@ SolverOutcome SolveBlocked(const LevelView& view, std::span<const Term> terms, C
       outcome.termination = TerminationName(summary.termination_type);
     }
     outcome.usable = outcome.usable && summary.IsSolutionUsable();
+  }
+  if (!outcome.usable) {
+    outcome.termination = "failure";
+    net = before;
+  }
+  return outcome;
+}
+
+namespace {
+
+// The residuals of a problem over a net, block by block.
+class ResidualBlocks {
+ public:
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
+  struct Block {
+    Eigen::VectorXd residual;
+    std::vector<int> vertices;
+    std::vector<Matrix> slopes;  // one per vertex
+  };
+
+  ResidualBlocks(const ceres::Problem& problem, const ControlNet& net)
+      : problem_(problem), first_(net.vertices.front().data()) {
+    problem.GetResidualBlocks(&blocks_);
+  }
+
+  void ForEach(const auto& use) const {
+    for (const ceres::ResidualBlockId id : blocks_) {
+      use(At(id));
+    }
+  }
+
+  std::vector<int> Vertices() const {
+    std::vector<double*> parameters;
+    problem_.GetParameterBlocks(&parameters);
+    std::vector<int> vertices;
+    for (const double* const parameter : parameters) {
+      vertices.push_back(VertexOf(parameter));
+    }
+    return vertices;
+  }
+
+ private:
+  int VertexOf(const double* parameter) const { return static_cast<int>((parameter - first_) / 3); }
+
+  Block At(ceres::ResidualBlockId id) const {
+    Block block;
+    std::vector<double*> parameters;
+    problem_.GetParameterBlocksForResidualBlock(id, &parameters);
+    block.residual.resize(problem_.GetCostFunctionForResidualBlock(id)->num_residuals());
+    block.slopes.assign(parameters.size(), Matrix(block.residual.size(), 3));
+    std::vector<double*> slopes;
+    for (std::size_t k = 0; k < parameters.size(); ++k) {
+      block.vertices.push_back(VertexOf(parameters[k]));
+      slopes.push_back(block.slopes[k].data());
+    }
+    problem_.EvaluateResidualBlock(id, /*apply_loss_function=*/false, nullptr,
+                                   block.residual.data(), slopes.data());
+    return block;
+  }
+
+  const ceres::Problem& problem_;
+  const double* first_;
+  std::vector<ceres::ResidualBlockId> blocks_;
+};
+
+// The least-squares problem of the terms over a net. Tangent points are summed point by point
+// (tangent_points.h); all other terms are evaluated as residual blocks of a ceres::Problem.
+class CoupledSquares {
+ public:
+  CoupledSquares(std::span<const Term> terms, const LevelView& view, ControlNet& net) : net_(net) {
+    for (const Term& term : terms) {
+      const auto* const sliding = std::get_if<TangentPointTerm>(&term);
+      if (sliding != nullptr && sliding->weight > 0 && !view.observations.empty()) {
+        sliding_.emplace_back(*sliding, view);
+      } else {
+        AddResiduals(std::span(&term, 1), view, net, problem_);
+      }
+    }
+    blocks_.emplace(problem_, net);
+  }
+
+  // The number of vertices with an effect on some term.
+  int FreeVertices() const {
+    std::vector<char> touched(net_.vertices.size(), 0);
+    const auto touch = [&](std::span<const int> vertices) {
+      for (const int vertex : vertices) {
+        touched[vertex] = 1;
+      }
+    };
+    touch(blocks_->Vertices());
+    for (const TangentSums& sums : sliding_) {
+      sums.ForEachDof(touch);
+    }
+    return static_cast<int>(std::ranges::count(touched, 1));
+  }
+
+  SparseMatrix NormalMatrix() const {
+    BlockTriangleSum sum(net_.vertices.size());
+    blocks_->ForEach([&](const ResidualBlocks::Block& block) {
+      Add(
+          block.vertices,
+          [&](std::size_t a, std::size_t b) -> Mat3 {
+            return block.slopes[a].transpose() * block.slopes[b];
+          },
+          sum);
+    });
+    for (const TangentSums& sums : sliding_) {
+      sums.ForEachElement([&](std::span<const int> dofs, const Eigen::MatrixXd& normal) {
+        Add(
+            dofs,
+            [&](std::size_t a, std::size_t b) -> Mat3 {
+              return normal.block<3, 3>(static_cast<Eigen::Index>(3 * a),
+                                        static_cast<Eigen::Index>(3 * b));
+            },
+            sum);
+      });
+    }
+    return sum.Take();
+  }
+
+  // Minus the gradient.
+  Eigen::VectorXd Downhill() const {
+    Eigen::VectorXd down =
+        Eigen::VectorXd::Zero(static_cast<Eigen::Index>(3 * net_.vertices.size()));
+    blocks_->ForEach([&](const ResidualBlocks::Block& block) {
+      for (std::size_t k = 0; k < block.vertices.size(); ++k) {
+        down.segment<3>(3 * block.vertices[k]) -= block.slopes[k].transpose() * block.residual;
+      }
+    });
+    for (const TangentSums& sums : sliding_) {
+      sums.AddDownhill(net_, down);
+    }
+    return down;
+  }
+
+ private:
+  // product(a, b): the 3 x 3 block of the a-th and b-th of the vertices.
+  static void Add(std::span<const int> vertices, const auto& product, BlockTriangleSum& sum) {
+    for (std::size_t a = 0; a < vertices.size(); ++a) {
+      for (std::size_t b = 0; b < vertices.size(); ++b) {
+        if (vertices[a] >= vertices[b]) {
+          sum.Add(vertices[a], vertices[b], product(a, b));
+        }
+      }
+    }
+  }
+
+  const ControlNet& net_;
+  ceres::Problem problem_;
+  std::optional<ResidualBlocks> blocks_;
+  std::vector<TangentSums> sliding_;
+};
+
+// Returns whether the steps have converged. Weakly determined vertices need several steps, and
+// round-off may keep the steps from becoming shorter than the tolerance.
+bool AtRest(double move, double last_move) {
+  return move <= kStepTolerance || (move <= 1e-9 && move >= last_move);
+}
+
+// In exact arithmetic no step is longer than the first. A step that is longer by more than
+// round-off shows a matrix so close to singular that its factor leads away from the solution.
+bool Diverges(double length, double first_length, double move) {
+  constexpr double kRounding = 1e-6;  // shorter steps may grow by round-off
+  return length > first_length && move > kRounding;
+}
+
+}  // namespace
+
+SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, ControlNet& net) {
+  const CoupledSquares squares(terms, view, net);
+  SolverOutcome outcome{.free_vertices = squares.FreeVertices()};
+  if (outcome.free_vertices == 0) {
+    return outcome;
+  }
+  const std::size_t vertices = net.vertices.size();
+  const SparseFactor factor(squares.NormalMatrix(), ProximalShift(terms, vertices),
+                            RowKind::kCoordinate);
+  const ControlNet before = net;
+  Eigen::Map<Eigen::VectorXd> x(net.vertices.front().data(),
+                                static_cast<Eigen::Index>(3 * vertices));
+  outcome.usable = factor.usable();
+  outcome.termination = outcome.usable ? "no_convergence" : "failure";
+  double move = 1e300, first_length = 1e300;
+  while (outcome.usable && outcome.iterations < kMaxIterations) {
+    const Eigen::VectorXd step = factor.Solve(squares.Downhill());
+    x += step;
+    ++outcome.iterations;
+    const double length = step.norm();
+    const double last_move = std::exchange(move, length / std::max(x.norm(), 1e-13));
+    first_length = outcome.iterations == 1 ? length : first_length;
+    outcome.usable = step.allFinite() && !Diverges(length, first_length, move);
+    if (outcome.usable && AtRest(move, last_move)) {
+      outcome.termination = "convergence";
+      break;
+    }
   }
   if (!outcome.usable) {
     outcome.termination = "failure";

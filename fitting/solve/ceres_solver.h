@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Ceres on a view, of a level alone or of all levels at once: the sum of its terms at its minimum.
+// Solvers that minimise the sum of the terms of a view, either of a single level or of all levels.
 #pragma once
 
 #include <span>
@@ -12,22 +12,28 @@ namespace semblance {
 
 struct SolverOutcome {
   int iterations = 0;
-  int free_vertices = 0;  // that some term touches
+  int free_vertices = 0;  // vertices with an effect on some term
   std::string termination = "nothing to solve";
-  bool usable = true;  // else the net is as it was
+  bool usable = true;  // false: the solver failed and the net is unchanged
 };
 
-// Any terms: one problem with a block of 3 doubles per vertex, sparse Cholesky, one thread.
+// Solves for any terms by one ceres::Problem with a parameter block of 3 doubles per vertex, sparse
+// Cholesky and one thread.
 SolverOutcome SolveByCeres(const LevelView& view, std::span<const Term> terms, ControlNet& net);
 
-// Separable terms: one problem per coordinate, whose blocks are tiles of 3 x 3 vertices, which
-// sparse Cholesky likes far better than single ones; the rows of each patch are reduced to at most
-// sixteen. The minimiser of SolveByCeres, many times faster.
+// Solves for separable terms by one ceres::Problem per coordinate. The parameter blocks are tiles
+// of 3 x 3 vertices, which sparse Cholesky handles much faster than single vertices, and the rows
+// of each patch are compressed to at most sixteen. The minimiser is that of SolveByCeres.
 SolverOutcome SolveBlocked(const LevelView& view, std::span<const Term> terms, ControlNet& net);
 
-// What solves of a level add to the diagonal of the normal equations of so many vertices. A
-// multiple of the identity makes them proximal-point steps, which go to the least-squares solution
-// nearest to the start.
+// The multiple of the identity that solves of a single level add to the normal equations. It turns
+// them into proximal-point steps, which converge to the least-squares solution nearest to the
+// start.
 double ProximalShift(std::span<const Term> terms, std::size_t vertices);
+
+// Solves for linear terms (AllLinear), which may couple x, y and z, by one sparse Cholesky factor
+// over all coordinates. It takes steps with this factor until they are as short as round-off. The
+// minimiser is that of SolveByCeres, which makes a factor in each step.
+SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, ControlNet& net);
 
 }  // namespace semblance

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "fitting/space/spline_element.h"
+#include "fitting/space/hierarchical_spline_space.h"
 
 namespace semblance {
 namespace {
@@ -57,11 +57,11 @@ std::vector<Vec3> ExactEquations::At(const ControlNet& values) const {
   return at;
 }
 
-double ExactEquations::MissOf(const Equation& equation, std::span<const Vec3> at) const {
+double ExactEquations::Miss(const Equation& equation, std::span<const Vec3> at) const {
   return equation.along.dot(at[equation.functional]) - equation.value;
 }
 
-// Of all functionals, a column each.
+// The coefficients of the functionals, one column each.
 Eigen::MatrixXd ExactEquations::Rows(Eigen::Index unknowns) const {
   Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(unknowns, std::ssize(functionals_));
   for (Eigen::Index f = 0; f < rows.cols(); ++f) {
@@ -72,17 +72,19 @@ Eigen::MatrixXd ExactEquations::Rows(Eigen::Index unknowns) const {
   return rows;
 }
 
-// What each equation must be pulled with for all to hold. gram: of the functionals, by H^-1. The
-// equations are scaled to 1 on the diagonal, for places and tangents differ by orders.
+// The multipliers with which all equations hold. gram: products of the functionals through H^-1.
+// The equations are scaled to 1 on the diagonal, because places and tangents differ by orders of
+// magnitude.
 Eigen::VectorXd ExactEquations::Forces(const Eigen::MatrixXd& gram,
                                        std::span<const Vec3> at) const {
+  // Equations closer than this are dependent; round-off is 1e-15.
   constexpr double kDependent = 1e-11;
   const Eigen::Index count = std::ssize(equations_);
   Eigen::VectorXd scale(count), misses(count);
   for (Eigen::Index e = 0; e < count; ++e) {
     const int f = equations_[e].functional;
     scale[e] = 1 / std::sqrt(std::max(gram(f, f), 1e-300));
-    misses[e] = scale[e] * MissOf(equations_[e], at);
+    misses[e] = scale[e] * Miss(equations_[e], at);
   }
   Eigen::MatrixXd system(count, count);
   for (Eigen::Index e = 0; e < count; ++e) {
@@ -96,8 +98,8 @@ Eigen::VectorXd ExactEquations::Forces(const Eigen::MatrixXd& gram,
   return solver.compute(system).solve(misses).cwiseProduct(scale);
 }
 
-Eigen::MatrixX3d ExactEquations::Bend(const SparseFactor& factor, const ControlNet& values,
-                                      const Eigen::MatrixX3d& step) const {
+Eigen::MatrixX3d ExactEquations::ConstrainStep(const SparseFactor& factor, const ControlNet& values,
+                                               const Eigen::MatrixX3d& step) const {
   const Eigen::MatrixXd rows = Rows(step.rows()), ways = factor.Solve(rows);
   ControlNet after = values;
   for (std::size_t k = 0; k < after.vertices.size(); ++k) {
@@ -111,12 +113,12 @@ Eigen::MatrixX3d ExactEquations::Bend(const SparseFactor& factor, const ControlN
   return bent;
 }
 
-std::vector<double> ExactEquations::MissesOf(const ControlNet& values) const {
+std::vector<double> ExactEquations::Misses(const ControlNet& values) const {
   const std::vector<Vec3> at = At(values);
   std::vector<double> misses(static_cast<std::size_t>(points_), 0);
   for (const Equation& equation : equations_) {
     double& miss = misses[static_cast<std::size_t>(equation.point)];
-    miss = std::max(miss, std::abs(MissOf(equation, at)));
+    miss = std::max(miss, std::abs(Miss(equation, at)));
   }
   return misses;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a solve tells of itself.
+// The summary of a solve.
 #pragma once
 
 #include <string>
@@ -9,40 +9,40 @@
 
 namespace semblance {
 
-// What a solve measures beside what it needs. Of rounds that follow each other only the last is
-// told of, and measuring is a good part of a round.
+// Selects whether a solve also measures term costs, coverage and rank. Measuring takes a good part
+// of a round, so only the last of several rounds makes a full report.
 enum class SolveReport { kFull, kNone };
 
 struct PatchCoverage {
-  int patches = -1;                   // of the level; adaptive fits: the finest everywhere
-  int empty_patches = -1;             // in which no observation lies
-  double median_patch_points = kNaN;  // observations in each of the others
+  int patches = -1;                   // patches of the level; adaptive fits: all leaves
+  int empty_patches = -1;             // patches without an observation
+  double median_patch_points = kNaN;  // median number of observations in the other patches
 };
 
 struct TermCosts {
   std::string term;      // its kName
   double before = kNaN;  // mm^2, at LevelView::start
-  double after = kNaN;   // mm^2, at the solution, before any fraction is taken
+  double after = kNaN;   // mm^2, at the solution, before the step's fraction is applied
 };
 
 struct LevelSummary {
   int level = -1;                // set by Fit
   double fraction = kNaN;        // set by Fit
   std::vector<TermCosts> terms;  // in the order of the terms
-  double rms_before_mm = kNaN;   // of the observations, weighted
-  double rms_after_mm = kNaN;    // at the solution; Fit gives that of the surface it wrote back
-  int iterations = -1;           // of the solver
-  int free_vertices = -1;        // that some term touches; all others stay
-  int uncovered_vertices = -1;   // that no observation touches
-  PatchCoverage coverage = {};   // of the patches by the observations
-  int rank = -1;  // estimated numerical rank of the observations' matrix; free_vertices - rank
-                  // directions are left to the other terms, or stay; -1: not asked (adaptive fits
-                  // ask at the end)
-  double max_move_mm = kNaN;       // of a vertex, at the solution; Fit: as written back
-  double auto_weight = kNaN;       // what `weight: auto` became, if a term has it
+  double rms_before_mm = kNaN;   // root mean square distance of the observations, weighted
+  double rms_after_mm = kNaN;    // at the solution; Fit: after the step's fraction
+  int iterations = -1;           // iterations of the solver
+  int free_vertices = -1;        // vertices with an effect on some term; all others stay
+  int uncovered_vertices = -1;   // vertices without an observation in their support
+  PatchCoverage coverage = {};   // observations per patch
+  // Estimated numerical rank of the observations' matrix; free_vertices - rank directions are left
+  // to the other terms, or stay. -1: not computed (adaptive fits compute it at the end).
+  int rank = -1;
+  double max_move_mm = kNaN;       // largest move of a vertex; Fit: after the step's fraction
+  double auto_weight = kNaN;       // weight that was chosen for `weight: auto`, if a term has it
   std::string solver = "not run";  // ceres or direct
   std::string termination = "not run";
-  bool usable = false;  // the solver's solution can be used; else the net is unchanged
+  bool usable = false;  // false: the solver failed and the net is unchanged
 };
 
 }  // namespace semblance

@@ -9,8 +9,8 @@
 namespace semblance {
 namespace {
 
-// Vertices of the next level on the knots of a patch (and beyond, at a border or by the margin)
-// that are not edited.
+// The vertices of the next level on the knots of a patch that are not edited. At a border, and with
+// a margin, they extend beyond the patch.
 std::vector<VertexId> MissingOver(const HierarchicalSplineSpace& space, const PatchId& patch,
                                   int margin) {
   const HSplineShape& shape = space.shape();
@@ -36,26 +36,26 @@ std::vector<VertexId> MissingOver(const HierarchicalSplineSpace& space, const Pa
   return missing;
 }
 
-// How many points the patches of a space hold.
+// The numbers of points in the patches of a space.
 class PatchCounts {
  public:
   explicit PatchCounts(const HierarchicalSplineSpace& space) : shape_(space.shape()) {
     for (const QuadtreeNode& node : space.nodes()) {
-      counts_.emplace(KeyOf(node.patch), node.range.size());
+      counts_.emplace(MakeKey(node.patch), node.range.size());
     }
   }
 
-  // Of the eight patches around one, those that have plainly fewer points than it: a gap, or its
-  // edge. A quarter is seldom by chance where there are min_points.
+  // The neighbours (of eight) with less than a quarter of the patch's points: they are a gap or its
+  // edge. With at least min_points points, a quarter seldom occurs by chance.
   std::vector<PatchId> EmptierAround(const PatchId& patch) const {
-    const std::size_t own = counts_.at(KeyOf(patch));
+    const std::size_t own = counts_.at(MakeKey(patch));
     std::vector<PatchId> emptier;
     for (int k = 0; k < 9; ++k) {
       const PatchId other{
           patch.level,
           PlaceAmong(shape_.PatchesU(patch.level), patch.i + k % 3 - 1, shape_.ClosedU()),
           PlaceAmong(shape_.PatchesV(patch.level), patch.j + k / 3 - 1, false)};
-      const auto found = counts_.find(KeyOf(other));
+      const auto found = counts_.find(MakeKey(other));
       if (found != counts_.end() && 4 * found->second < own) {
         emptier.push_back(other);
       }
@@ -65,13 +65,13 @@ class PatchCounts {
 
  private:
   using Key = std::tuple<int, int, int>;
-  static Key KeyOf(const PatchId& p) { return {p.level, p.i, p.j}; }
+  static Key MakeKey(const PatchId& p) { return {p.level, p.i, p.j}; }
 
   HSplineShape shape_;
   std::map<Key, std::size_t> counts_;
 };
 
-// Whether some point of a leaf is farther off than it may be.
+// Returns whether some point of a leaf exceeds its tolerance.
 bool Misses(const HSplineShape& shape, const QuadtreeNode& leaf, const AdaptivePlan& plan,
             const PointCloud& cloud, std::span<const double> squares) {
   if (plan.regions.empty()) {
@@ -94,19 +94,20 @@ std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
                                         const AdaptivePlan& plan, const PointCloud& cloud,
                                         std::span<const double> squares,
                                         std::span<const Vec2> places) {
-  std::set<int> asked;  // leaves
+  std::set<int> requested;  // leaves
   for (const Vec2& uv : places) {
-    asked.insert(space.LeafAt(uv));
+    requested.insert(space.LeafAt(uv));
   }
   const PatchCounts counts(space);
   std::set<VertexId> finer;
   for (int node = 0; node < std::ssize(space.nodes()); ++node) {
     const QuadtreeNode& leaf = space.nodes()[node];
-    const bool enough = leaf.range.size() >= static_cast<std::size_t>(plan.min_points);
+    const bool has_points = leaf.range.size() >= static_cast<std::size_t>(plan.min_points);
     if (leaf.children >= 0) {
       continue;
     }
-    if (!asked.contains(node) && !(enough && Misses(space.shape(), leaf, plan, cloud, squares))) {
+    if (!requested.contains(node) &&
+        !(has_points && Misses(space.shape(), leaf, plan, cloud, squares))) {
       continue;
     }
     for (int level = 0; level <= std::min(leaf.patch.level, plan.finest - 1); ++level) {

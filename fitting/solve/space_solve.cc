@@ -10,10 +10,8 @@
 #include <utility>
 
 #include "fitting/solve/auto_weight.h"
-#include "fitting/solve/coupled_solver.h"
 #include "fitting/solve/exact_points.h"
 #include "fitting/solve/refinement_marking.h"
-#include "fitting/terms/robust_loss.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
@@ -21,7 +19,9 @@
 namespace semblance {
 namespace {
 
-constexpr int kMostSteps = 50, kMostReweightings = 300;
+// Limits of the iterations, which normally end by their tolerances. Steps converge at once or
+// never; reweighting converges linearly.
+constexpr int kMaxSteps = 50, kMaxReweightings = 300;
 
 bool IsActive(const Term& term) { return WeightOf(term) > 0; }
 
@@ -45,43 +45,43 @@ bool Has(std::span<const Term> terms) {
   return HasActive(terms, [](const Term& term) { return std::holds_alternative<T>(term); });
 }
 
-// What a space or a level has for its terms to look at.
-struct InSight {
+// The inputs that terms may need.
+struct TermInputs {
   Vec2 lengths_mm;
   bool feet = false, landmarks = false, shape = false;
 };
 
-void CheckTerms(std::span<const Term> terms, const InSight& sight) {
-  const bool extent = sight.lengths_mm.allFinite() && sight.lengths_mm.minCoeff() > 0;
+void CheckTerms(std::span<const Term> terms, const TermInputs& given) {
+  const bool extent = given.lengths_mm.allFinite() && given.lengths_mm.minCoeff() > 0;
   if (!extent && std::any_of(terms.begin(), terms.end(), IsSmoothness)) {
     throw InputError(fmt::format(
         "fit: the template's mean lengths along u and v are {} and {} mm; the smoothness and "
         "membrane terms need a template that is more than a point or a line",
-        sight.lengths_mm.x(), sight.lengths_mm.y()));
+        given.lengths_mm.x(), given.lengths_mm.y()));
   }
   const auto bone = std::find_if(terms.begin(), terms.end(), [](const Term& term) {
     return IsActive(term) && (std::holds_alternative<NonPenetrationTerm>(term) ||
                               std::holds_alternative<SpringTerm>(term));
   });
-  if (bone != terms.end() && !sight.feet) {
+  if (bone != terms.end() && !given.feet) {
     throw InputError(fmt::format(
-        "fit: the term '{}' looks at bone, and no point has a foot on bone; leave it out, or "
+        "fit: the term '{}' needs points with a foot on bone, and there are none; leave it out, or "
         "fit a face to a skull",
         TermName(*bone)));
   }
-  if (Has<LandmarkTerm>(terms) && !sight.landmarks) {
+  if (Has<LandmarkTerm>(terms) && !given.landmarks) {
     throw InputError(
-        "fit: the term 'landmarks' looks at standard landmarks, and no point is one; leave "
-        "it out, or fit a face to dowels at sites");
+        "fit: the term 'landmarks' needs standard landmarks among the points, and there are none; "
+        "leave it out, or fit a face to dowels at sites");
   }
-  if (Has<PriorShapeTerm>(terms) && !sight.shape) {
+  if (Has<PriorShapeTerm>(terms) && !given.shape) {
     throw InputError(
-        "fit: the term 'prior_shape' looks at a prior's face, and there is none; leave it out, or "
+        "fit: the term 'prior_shape' needs a prior's face, and there is none; leave it out, or "
         "write face: prior_then_fit");
   }
 }
 
-LevelView Checked(LevelView view) {
+void CheckNets(const LevelView& view) {
   const std::size_t count = static_cast<std::size_t>(view.grid.Columns()) * view.grid.Rows();
   if (view.start.vertices.size() != count || view.rest.vertices.size() != count) {
     throw InputError(fmt::format(
@@ -90,16 +90,15 @@ LevelView Checked(LevelView view) {
         view.start.vertices.size(), view.rest.vertices.size(), view.grid.Columns(),
         view.grid.Rows()));
   }
-  return view;
 }
 
 bool NeedsRows(std::span<const Term> terms, Solver solver) {
   return solver != Solver::kFastest || !SeparableButForLoss(terms);
 }
 
-// A view that no term takes rows of gives its observations away: the cloud says it all, and they
-// are 56 bytes each.
-PointCloud CloudOf(std::span<const Term> terms, Solver solver, LevelView& view) {
+// Makes the cloud of a view's observations. If no term needs rows of the observations, they are
+// then freed: the cloud holds the same data, and an observation has 56 bytes.
+PointCloud MakeCloud(std::span<const Term> terms, Solver solver, LevelView& view) {
   PointCloud cloud(view.grid.Shape(), view.observations);
   if (NeedsRows(terms, solver) || Has<LandmarkTerm>(terms)) {
     SortObservations(cloud, view.observations);
@@ -126,7 +125,7 @@ ControlNet Moved(ControlNet net, const Eigen::MatrixX3d& step) {
   return net;
 }
 
-// Of the vertices of level 0, root mean square.
+// The root mean square distance of the vertices of level 0 from the origin.
 double NetSize(const HierarchicalSplineSpace& space) {
   double size = 1e-300;
   int count = 0;
@@ -139,145 +138,191 @@ double NetSize(const HierarchicalSplineSpace& space) {
 
 }  // namespace
 
-SpaceSolve::SpaceSolve(const SpaceProblem& problem)
-    : target_(&problem.target),
-      rest_(problem.rest),
-      cloud_(problem.start.shape(), problem.target),
+SpaceSolve::SpaceSolve(Problem problem)
+    : rest_(std::move(problem.rest)),
+      cloud_(std::move(problem.cloud)),
       space_(problem.start, rest_, cloud_),
       terms_(problem.terms.begin(), problem.terms.end()),
-      held_(problem.held.begin(), problem.held.end()),
+      threads_(problem.threads),
+      lengths_mm_(problem.lengths_mm),
+      landmark_weight_(problem.landmark_weight),
       auto_term_(AutoTerm(terms_)),
       solver_(problem.solver),
-      threads_(problem.threads),
-      lengths_mm_(MeanLengths(rest_)),
-      settled_(problem.settled) {
-  const auto& anchors = problem.target.anchors;
-  for (const FitPoint& point : problem.target.points) {
-    landmark_weight_ += point.role == PointRole::kLandmark ? point.weight : 0;
+      final_loss_width_(problem.final_loss_width) {}
+
+LevelSolve::LevelSolve(LevelView level, std::span<const Term> terms, Solver solver)
+    : SpaceSolve(Prepare(level, terms, solver)), view_(std::move(level)) {
+  CheckTerms(terms_, {.lengths_mm = lengths_mm_,
+                      .feet = !view_.bone.empty(),
+                      .landmarks = landmark_weight_ > 0,
+                      .shape = !view_.likely.empty()});
+  MarkStart();
+  Measure();
+}
+
+// Sorts the observations and bone points of `level`, or frees the observations.
+SpaceSolve::Problem LevelSolve::Prepare(LevelView& level, std::span<const Term> terms,
+                                        Solver solver) {
+  CheckNets(level);
+  PointCloud cloud = MakeCloud(terms, solver, level);
+  SortBone(level.bone);
+  return {.start = HSplineSurface(level.grid.Shape(), level.start),
+          .rest = HSplineSurface(level.grid.Shape(), level.rest),
+          .cloud = std::move(cloud),
+          .terms = terms,
+          .solver = solver,
+          .lengths_mm = level.lengths_mm,
+          .landmark_weight = level.LandmarkWeightSum(),
+          .final_loss_width = true};
+}
+
+namespace {
+
+double LandmarkWeightSum(const FitTarget& target) {
+  double sum = 0;
+  for (const FitPoint& point : target.points) {
+    sum += point.role == PointRole::kLandmark ? point.weight : 0;
   }
+  return sum;
+}
+
+}  // namespace
+
+AdaptiveSolve::AdaptiveSolve(const SpaceProblem& problem)
+    : SpaceSolve({.start = problem.start,
+                  .rest = problem.rest,
+                  .cloud = PointCloud(problem.start.shape(), problem.target),
+                  .terms = problem.terms,
+                  .solver = problem.solver,
+                  .threads = problem.threads,
+                  .lengths_mm = MeanLengths(problem.rest),
+                  .landmark_weight = LandmarkWeightSum(problem.target),
+                  .final_loss_width = problem.final_loss_width}),
+      target_(problem.target),
+      held_(problem.held.begin(), problem.held.end()) {
+  const auto& anchors = target_.anchors;
   CheckTerms(terms_, {.lengths_mm = lengths_mm_,
                       .feet = std::any_of(anchors.begin(), anchors.end(),
                                           [](const BoneAnchor& a) { return a.foot.allFinite(); }),
                       .landmarks = landmark_weight_ > 0,
-                      .shape = !problem.target.shape.empty()});
+                      .shape = !target_.shape.empty()});
   EditMirrors();
-  Begin();
+  MarkStart();
   Measure();
 }
 
-SpaceSolve::SpaceSolve(LevelView level, std::span<const Term> terms, Solver solver)
-    : view_(Checked(std::move(level))),
-      rest_(view_->grid.Shape(), view_->rest),
-      cloud_(CloudOf(terms, solver, *view_)),
-      space_(HSplineSurface(view_->grid.Shape(), view_->start), rest_, cloud_),
-      terms_(terms.begin(), terms.end()),
-      auto_term_(AutoTerm(terms_)),
-      solver_(solver),
-      lengths_mm_(view_->lengths_mm),
-      settled_(true) {
-  SortBone(view_->bone);
-  landmark_weight_ = view_->LandmarkWeightSum();
-  CheckTerms(terms_, {.lengths_mm = lengths_mm_,
-                      .feet = !view_->bone.empty(),
-                      .landmarks = landmark_weight_ > 0,
-                      .shape = !view_->likely.empty()});
-  Begin();
-  Measure();
+// The view of an earlier start is no longer valid (invariant 3).
+void AdaptiveSolve::MarkStart() {
+  SpaceSolve::MarkStart();
+  view_.reset();
 }
 
-void SpaceSolve::Begin() {
-  start_ = space_.Values();
-  if (target_ != nullptr) {
-    view_.reset();
-  }
-}
-
-const LevelView& SpaceSolve::View() {
+const LevelView& AdaptiveSolve::View() {
   if (!view_) {
-    view_ = ViewOfSpace(space_, cloud_, *target_, lengths_mm_);
+    view_ = MakeSpaceView(space_, cloud_, target_, lengths_mm_);
     view_->start = start_;
     view_->held = HeldRows();
   }
   return *view_;
 }
 
-void SpaceSolve::SeePoints() {
-  cloud_ = PointCloud(space_.shape(), *target_);
+bool AdaptiveSolve::IsLandmark(std::size_t k) const {
+  return target_.points[cloud_.Given(k)].role == PointRole::kLandmark;
+}
+
+std::vector<int> AdaptiveSolve::HeldRows() const {
+  std::vector<int> rows;
+  for (const VertexId& vertex : held_) {
+    if (const int row = space_.FindRow(vertex); row >= 0) {
+      rows.push_back(row);
+    }
+  }
+  return rows;
+}
+
+void AdaptiveSolve::UpdatePoints() {
+  cloud_ = PointCloud(space_.shape(), target_);
   space_.Rebin();
-  Begin();
+  MarkStart();
   Measure();
 }
 
-bool SpaceSolve::Refine(const AdaptivePlan& plan) {
+void AdaptiveSolve::Edit(std::span<const VertexId> vertices) {
+  space_.Edit(vertices);
+  EditMirrors();
+  MarkStart();
+  Measure();
+}
+
+// With regions the sums lose the factors of a loss here. If nothing is refined they stay so, and
+// the first FinalSolve measures again.
+bool AdaptiveSolve::Refine(const AdaptivePlan& plan) {
   std::vector<double> squares;
   if (!plan.regions.empty()) {
     space_.Measure({}, threads_, &squares);
   }
-  const std::vector<VertexId> finer = MarkForRefinement(space_, plan, cloud_, squares, Unmet());
-  if (finer.empty()) {
-    return false;
+  const std::vector<VertexId> finer =
+      MarkForRefinement(space_, plan, cloud_, squares, UnmetPlaces());
+  if (!finer.empty()) {
+    Edit(finer);
   }
-  space_.Edit(finer);
-  EditMirrors();
-  Begin();
-  Measure();
-  return true;
+  return !finer.empty();
 }
 
-std::vector<double> SpaceSolve::ExactMisses() const {
-  return HasExact() ? ExactEquations(space_, target_->exact).MissesOf(space_.Values())
-                    : std::vector<double>();
+std::vector<double> AdaptiveSolve::ExactMisses() const {
+  return target_.exact.empty() ? std::vector<double>()
+                               : ExactEquations(space_, target_.exact).Misses(space_.Values());
 }
 
-double SpaceSolve::LeastMiss_mm() const { return 1e-10 * NetSize(space_); }
+double AdaptiveSolve::MissTolerance_mm() const { return 1e-10 * NetSize(space_); }
 
-// Places of exact points that the vertices cannot hold.
-std::vector<Vec2> SpaceSolve::Unmet() const {
+// The places of exact points that the vertices cannot hold.
+std::vector<Vec2> AdaptiveSolve::UnmetPlaces() const {
   std::vector<Vec2> unmet;
   const std::vector<double> misses = ExactMisses();
   for (std::size_t k = 0; k < misses.size(); ++k) {
-    if (misses[k] > LeastMiss_mm()) {
-      unmet.push_back(target_->exact[k].uv);
+    if (misses[k] > MissTolerance_mm()) {
+      unmet.push_back(target_.exact[k].uv);
     }
   }
   return unmet;
 }
 
-// Then a patch's mirror image is a patch too.
-void SpaceSolve::EditMirrors() {
+// Restores invariant 4.
+void AdaptiveSolve::EditMirrors() {
   if (!Has<SymmetryTerm>(terms_)) {
     return;
   }
   std::vector<VertexId> mirrors;
   for (const ControlDof& dof : space_.dofs()) {
-    mirrors.push_back(MirrorOf(space_.shape(), dof.vertex));
+    mirrors.push_back(MirrorVertex(space_.shape(), dof.vertex));
   }
   space_.Edit(mirrors);
 }
 
-LevelSummary SpaceSolve::Settle(SolveReport report) {
-  if (!std::exchange(settled_, true)) {
+LevelSummary SpaceSolve::FinalSolve(SolveReport report) {
+  if (!std::exchange(final_loss_width_, true)) {
     Measure();
   }
   LevelSummary summary = Solve(SolveTolerance::kTight, report);
   if (report == SolveReport::kFull) {
-    NoteCoverage(summary);
+    AddCoverage(summary);
   }
   return summary;
 }
 
 LevelSummary SpaceSolve::Solve(SolveTolerance until, SolveReport report) {
-  Begin();
+  MarkStart();
   const double auto_weight = ChooseSmoothness();
-  const Standing before = Stand(report);
-  const bool direct = solver_ == Solver::kFastest && (GoesDirectly() || AllLinear(terms_));
-  const SolverOutcome outcome = GoesDirectly() ? Descend(until)
-                                : direct       ? SolveAtOnce()
-                                               : SolveWithCeres(until);
+  const CostState before = EvaluateCosts(report);
+  const bool direct = solver_ == Solver::kFastest && (IsDirect() || AllLinear(terms_));
+  const SolverOutcome outcome = IsDirect() ? SolveByNewton(until)
+                                : direct   ? SolveWithOneFactor()
+                                           : SolveWithCeres(until);
   if (!outcome.usable) {
-    Take(start_);
+    SetUnknowns(start_);
   }
-  const Standing after = Stand(report);
+  const CostState after = EvaluateCosts(report);
   LevelSummary summary{.level = space_.finest(),
                        .fraction = 1,
                        .terms = {},
@@ -296,15 +341,15 @@ LevelSummary SpaceSolve::Solve(SolveTolerance until, SolveReport report) {
   return summary;
 }
 
-// The points as they are given, whatever a loss makes of them.
-void SpaceSolve::NoteCoverage(LevelSummary& summary) {
+// Adds the coverage and rank of the points with factors 1, without a loss.
+void SpaceSolve::AddCoverage(LevelSummary& summary) {
   std::vector<int> counts;
   for (const QuadtreeNode& node : space_.nodes()) {
     if (node.children < 0) {
       counts.push_back(static_cast<int>(node.range.size()));
     }
   }
-  summary.coverage = CoverageOf(counts);
+  summary.coverage = MakeCoverage(counts);
   if (weighed_) {
     space_.Measure({}, threads_, nullptr);
   }
@@ -330,20 +375,21 @@ double SpaceSolve::ChooseSmoothness() {
   const WeightChoice choice = ChooseWeight({.points = System(points),
                                             .smooth = System(smooth),
                                             .fixed = System(others),
-                                            .misfit = Scale() * space_.Squares(),
+                                            .misfit = PointScale() * space_.Squares(),
                                             .count = static_cast<double>(cloud_.points().size())},
                                            chosen_);
   if (std::isnan(choice.weight) && chosen_ <= 0) {
     throw InputError(
-        "weight: auto: no weight has a usable solve; more points than directions they determine "
-        "are needed, or give a number");
+        "weight: auto: no weight has a usable solve; give more points than the directions that "
+        "they "
+        "determine, or give a number");
   }
   chosen_ = std::isnan(choice.weight) ? chosen_ : choice.weight;
   SetWeight(chosen_, terms_[auto_term_]);
   return chosen_;
 }
 
-bool SpaceSolve::GoesDirectly() const { return !NeedsRows(terms_, solver_); }
+bool SpaceSolve::IsDirect() const { return !NeedsRows(terms_, solver_); }
 
 NormalSystem SpaceSolve::System(std::span<const Term> terms, SystemPart part) {
   std::vector<LevelStiffness> forms;
@@ -351,39 +397,29 @@ NormalSystem SpaceSolve::System(std::span<const Term> terms, SystemPart part) {
     forms = StiffnessByLevel(space_.shape(), terms, lengths_mm_);
   }
   const bool points = std::any_of(terms.begin(), terms.end(), IsOfPoints);
-  NormalSystem system = Assemble(space_, points ? Scale() : 0, forms, part);
+  NormalSystem system = Assemble(space_, points ? PointScale() : 0, forms, part);
   std::vector<Term> others;
   std::copy_if(terms.begin(), terms.end(), std::back_inserter(others), [](const Term& term) {
     return IsActive(term) && !IsOfPoints(term) && !IsSmoothness(term);
   });
   if (!others.empty()) {
-    AddRowsOf(others, View(), space_.Values(), part, system);
+    AddTermRows(others, View(), space_.Values(), part, system);
   }
   return system;
 }
 
-std::vector<int> SpaceSolve::HeldRows() const {
-  if (target_ == nullptr) {
-    return view_->held;
-  }
-  std::vector<int> rows;
-  for (const VertexId& vertex : held_) {
-    if (const int row = space_.RowOf(vertex); row >= 0) {
-      rows.push_back(row);
-    }
-  }
-  return rows;
+// The shift of the normal matrix. On several levels the proximal shift is too small: finer vertices
+// add to coarser ones, so the unknowns are nearly dependent. The value 1e-9 keeps the factor
+// usable, and further steps remove its effect on the solution.
+double SpaceSolve::DampingShift(const NormalSystem& system) const {
+  return HasOneLevel() ? ProximalShift(terms_, space_.rows())
+                       : 1e-9 * std::max(system.lower.diagonal().mean(), 1e-300);
 }
 
-// Where finer vertices hang on coarser ones, the unknowns are not to keep where they start.
-double SpaceSolve::Shift(const NormalSystem& system) const {
-  return AloneInItsLevel() ? ProximalShift(terms_, space_.rows())
-                           : 1e-9 * std::max(system.lower.diagonal().mean(), 1e-300);
-}
-
-// Damped Gauss-Newton steps, each on the residuals themselves, by one Cholesky factor for all
-// coordinates and, unless a loss changes the weights, all steps.
-SolverOutcome SpaceSolve::Descend(SolveTolerance until) {
+// Takes damped Gauss-Newton steps; each computes the residuals again, which removes the effect of
+// damping and round-off. One Cholesky factor serves all coordinates, and all steps unless a loss
+// changes the weights.
+SolverOutcome SpaceSolve::SolveByNewton(SolveTolerance until) {
   const bool loss = HasLoss(), loose = until == SolveTolerance::kLoose;
   const double least_move = loose ? 1e-4 : loss ? 1e-12 : 1e-13;
   NormalSystem system = System(terms_);
@@ -394,23 +430,23 @@ SolverOutcome SpaceSolve::Descend(SolveTolerance until) {
   }
   outcome.termination = "no_convergence";
   std::optional<SparseFactor> factor;
-  while (outcome.iterations < (loss ? kMostReweightings : kMostSteps)) {
+  while (outcome.iterations < (loss ? kMaxReweightings : kMaxSteps)) {
     if (outcome.iterations > 0 && loss) {
       system = System(terms_);
     } else if (outcome.iterations > 0) {
       system.right = System(terms_, SystemPart::kRight).right;
     }
     if (!factor || loss) {
-      factor.emplace(system.lower, Shift(system));
+      factor.emplace(system.lower, DampingShift(system));
     }
     ++outcome.iterations;
-    const Eigen::MatrixX3d step = StepBy(*factor, system);
+    const Eigen::MatrixX3d step = ComputeStep(*factor, system);
     outcome.usable = factor->usable() && step.allFinite();
     if (!outcome.usable) {
       outcome.termination = "failure";
       break;
     }
-    const bool moved = Move(step, system.right) > least_move;
+    const bool moved = ApplyStep(step, system.right) > least_move;
     if (!moved || (loose && !loss)) {
       outcome.termination = moved ? "first step" : "convergence";
       break;
@@ -419,29 +455,32 @@ SolverOutcome SpaceSolve::Descend(SolveTolerance until) {
   return outcome;
 }
 
-// Empty by a factor that cannot be used. Exact points hold after it.
-Eigen::MatrixX3d SpaceSolve::StepBy(const SparseFactor& factor, const NormalSystem& system) const {
+// The step after which the exact points hold (invariant 6). Empty if the factor is not usable.
+Eigen::MatrixX3d SpaceSolve::ComputeStep(const SparseFactor& factor,
+                                         const NormalSystem& system) const {
   if (!factor.usable()) {
     return {};
   }
   const Eigen::MatrixX3d step = factor.Solve(system.right);
-  return HasExact() ? ExactEquations(space_, target_->exact).Bend(factor, space_.Values(), step)
-                    : step;
+  return exact().empty()
+             ? step
+             : ExactEquations(space_, exact()).ConstrainStep(factor, space_.Values(), step);
 }
 
-// How far a step takes the surface, of its size. Of a level: by the vertices, so that those which
-// are hardly held come to rest too. How far a step moves the unknowns says nothing where a coarse
-// vertex is a sum of finer ones; then it is what the step takes off the cost.
-double SpaceSolve::Move(const Eigen::MatrixX3d& step, const Eigen::MatrixX3d& right) {
-  const double moved = Take(Moved(space_.Values(), step));
-  return AloneInItsLevel()
+// Applies a step and returns its length relative to the surface's size. For one level this is the
+// move of the vertices, so that weakly held vertices must come to rest too. For several levels a
+// move of the unknowns means little, because a coarse vertex is nearly a sum of finer ones; there
+// the length is the root of the decrease of the cost.
+double SpaceSolve::ApplyStep(const Eigen::MatrixX3d& step, const Eigen::MatrixX3d& right) {
+  const double moved = SetUnknowns(Moved(space_.Values(), step));
+  return HasOneLevel()
              ? moved
              : std::sqrt(std::max(step.cwiseProduct(right).sum(), 0.0) / PointWeight(terms_)) /
                    NetSize(space_);
 }
 
-// Returns the length of the move over that of all unknowns.
-double SpaceSolve::Take(const ControlNet& net) {
+// Sets the unknowns, and returns the length of their move relative to that of all unknowns.
+double SpaceSolve::SetUnknowns(const ControlNet& net) {
   const ControlNet from = space_.Values();
   space_.SetValues(net);
   Measure();
@@ -453,16 +492,16 @@ double SpaceSolve::Take(const ControlNet& net) {
   return std::sqrt(move / std::max(size, 1e-26));
 }
 
-SolverOutcome SpaceSolve::SolveAtOnce() {
+SolverOutcome SpaceSolve::SolveWithOneFactor() {
   ControlNet net = start_;
   const SolverOutcome outcome = SolveCoupled(View(), terms_, net);
-  Take(net);
+  SetUnknowns(net);
   return outcome;
 }
 
 SolverOutcome SpaceSolve::SolveWithCeres(SolveTolerance until) {
   if (SeparableButForLoss(terms_) && HasLoss()) {
-    return Reweigh(until == SolveTolerance::kTight ? 1e-12 : 1e-4);
+    return SolveReweighted(until == SolveTolerance::kTight ? 1e-12 : 1e-4);
   }
   std::vector<Term> terms = terms_;
   for (Term& term : terms) {
@@ -473,14 +512,15 @@ SolverOutcome SpaceSolve::SolveWithCeres(SolveTolerance until) {
   ControlNet net = start_;
   const SolverOutcome outcome = SeparableButForLoss(terms) ? SolveBlocked(View(), terms, net)
                                                            : SolveByCeres(View(), terms, net);
-  Take(net);
+  SetUnknowns(net);
   return outcome;
 }
 
-// Plain least squares with the weights that the losses give, again and again until the surface
-// stands still: one term of the points, in place of all, and the others. As rho(s) is concave for
-// each loss, the cost falls with every step (majorisation; Hunter & Lange 2004).
-SolverOutcome SpaceSolve::Reweigh(double least_move) {
+// Iteratively reweighted least squares: solves with the weights that the losses have at the present
+// surface, until the surface no longer moves. One point term replaces all terms of the points.
+// Because rho(s) is concave for each loss, the cost falls with every step (majorisation; Hunter &
+// Lange 2004).
+SolverOutcome SpaceSolve::SolveReweighted(double least_move) {
   LevelView view = View();
   const std::vector<Observation> given = view.observations;
   std::vector<Term> terms;
@@ -489,9 +529,9 @@ SolverOutcome SpaceSolve::Reweigh(double least_move) {
   PointTerm& points = std::get<PointTerm>(terms.emplace_back(PointTerm{}));
   SolverOutcome outcome{.termination = "no_convergence"};
   std::vector<double> factors;
-  while (outcome.usable && outcome.iterations < kMostReweightings) {
-    // The problem of the last time would only creep on where the points determine nothing.
-    const std::vector<double> before = std::exchange(factors, FactorsOf(squares_));
+  while (outcome.usable && outcome.iterations < kMaxReweightings) {
+    // With unchanged weights a further solve would only move what the points do not determine.
+    const std::vector<double> before = std::exchange(factors, LossFactors(squares_));
     if (factors == before) {
       outcome.termination = "convergence";
       break;
@@ -503,13 +543,13 @@ SolverOutcome SpaceSolve::Reweigh(double least_move) {
         view.observations.back().weight *= factors[k];
       }
     }
-    points.weight = Scale() * view.WeightSum();
+    points.weight = PointScale() * view.WeightSum();
     ControlNet net = space_.Values();
     const SolverOutcome step = SolveBlocked(view, terms, net);
     ++outcome.iterations;
     outcome.usable = step.usable;
     outcome.free_vertices = std::max(outcome.free_vertices, step.free_vertices);
-    if (Take(net) <= least_move || step.free_vertices == 0) {
+    if (SetUnknowns(net) <= least_move || step.free_vertices == 0) {
       outcome.termination = "convergence";
       break;
     }
@@ -518,17 +558,17 @@ SolverOutcome SpaceSolve::Reweigh(double least_move) {
   return outcome;
 }
 
-SpaceSolve::Standing SpaceSolve::Stand(SolveReport report) {
-  Standing standing{.rms_mm = rms_mm_};
+SpaceSolve::CostState SpaceSolve::EvaluateCosts(SolveReport report) {
+  CostState state{.rms_mm = rms_mm_};
   if (report == SolveReport::kFull) {
     for (const Term& term : terms_) {
-      standing.costs.push_back(CostOf(term));
+      state.costs.push_back(Cost(term));
     }
   }
-  return standing;
+  return state;
 }
 
-double SpaceSolve::CostOf(const Term& term) {
+double SpaceSolve::Cost(const Term& term) {
   if (!IsActive(term)) {
     return 0;
   }
@@ -541,25 +581,26 @@ double SpaceSolve::CostOf(const Term& term) {
     return cloud_.points().empty() ? 0 : points->weight * mean;
   }
   if (IsSmoothness(term)) {
-    return EnergyOf(space_, StiffnessByLevel(space_.shape(), std::span(&term, 1), lengths_mm_));
+    return TotalEnergy(space_, StiffnessByLevel(space_.shape(), std::span(&term, 1), lengths_mm_));
   }
   const ControlNet values = space_.Values();
   return std::visit([&](const auto& t) { return TermCost(t, View(), values); }, term);
 }
 
-// With factors: first the distances, then the sums with the factors that follow from them.
+// The factors of a loss follow from the distances, so these are measured first, and then the sums
+// with the factors.
 void SpaceSolve::Measure() {
   weighed_ = HasLoss() || Has<LandmarkTerm>(terms_);
   space_.Measure({}, threads_, weighed_ ? &squares_ : nullptr);
   rms_mm_ = cloud_.weight_sum() > 0 ? std::sqrt(space_.Squares() / cloud_.weight_sum()) : kNaN;
   if (weighed_) {
-    space_.Measure(FactorsOf(squares_), threads_, nullptr);
+    space_.Measure(LossFactors(squares_), threads_, nullptr);
   }
 }
 
-// Relative to Scale().
-std::vector<double> SpaceSolve::FactorsOf(const std::vector<double>& squares) const {
-  const double all = Scale() * cloud_.weight_sum(), least_width_mm = LeastLossWidth_mm();
+// The factor of each point's weight from all terms of the points, relative to PointScale().
+std::vector<double> SpaceSolve::LossFactors(const std::vector<double>& squares) const {
+  const double all = PointScale() * cloud_.weight_sum(), least_width_mm = LeastLossWidth_mm();
   std::vector<double> factors(squares.size(), 0);
   for (const Term& term : terms_) {
     if (!IsOfPoints(term)) {
@@ -573,37 +614,38 @@ std::vector<double> SpaceSolve::FactorsOf(const std::vector<double>& squares) co
       }
     } else {
       for (std::size_t k = 0; k < squares.size(); ++k) {
-        factors[k] += WeightOf(term) / all * LandmarkShare(k);
+        factors[k] += WeightOf(term) / all * LandmarkFactor(k);
       }
     }
   }
   return factors;
 }
 
-// What a point's weight is multiplied by, to have that of a landmark: 0 of others.
-double SpaceSolve::LandmarkShare(std::size_t k) const {
-  const bool landmark = target_ != nullptr
-                            ? target_->points[cloud_.Given(k)].role == PointRole::kLandmark
-                            : view_->observations[k].landmark;
-  return landmark ? cloud_.weight_sum() / landmark_weight_ : 0;
+// The factor that turns a point's weight in PointTerm into that in LandmarkTerm; 0 for other
+// points.
+double SpaceSolve::LandmarkFactor(std::size_t k) const {
+  return IsLandmark(k) ? cloud_.weight_sum() / landmark_weight_ : 0;
 }
 
 std::vector<double> SpaceSolve::PointWeights() const {
-  const std::vector<double> factors = weighed_ ? FactorsOf(squares_) : std::vector<double>();
+  const std::vector<double> factors = weighed_ ? LossFactors(squares_) : std::vector<double>();
   std::vector<double> weights(cloud_.points().size(), 0);
   const bool any = std::any_of(terms_.begin(), terms_.end(), IsOfPoints);
   for (std::size_t k = 0; any && k < weights.size(); ++k) {
-    weights[cloud_.Given(k)] = Scale() * cloud_.points()[k].weight() * (weighed_ ? factors[k] : 1);
+    weights[cloud_.Given(k)] =
+        PointScale() * cloud_.points()[k].weight() * (weighed_ ? factors[k] : 1);
   }
   return weights;
 }
 
+// Invariant 5.
 double SpaceSolve::LeastLossWidth_mm() const {
-  if (settled_ || !HasLoss() || squares_.empty()) {
+  constexpr double kMedians = 3;  // keeps well over half of the points within the loss
+  if (final_loss_width_ || !HasLoss() || squares_.empty()) {
     return 0;
   }
   std::vector<double> squares = squares_;
-  return 3 * std::sqrt(UpperMedian(squares));
+  return kMedians * std::sqrt(UpperMedian(squares));
 }
 
 bool SpaceSolve::HasLoss() const {
@@ -613,7 +655,7 @@ bool SpaceSolve::HasLoss() const {
   });
 }
 
-double SpaceSolve::Scale() const {
+double SpaceSolve::PointScale() const {
   const double weight = PointWeight(terms_);
   return cloud_.weight_sum() > 0 ? (weight > 0 ? weight : 1) / cloud_.weight_sum() : 0;
 }
@@ -631,6 +673,25 @@ HSplineSurface SpaceSolve::SurfaceAfter(const Eigen::MatrixX3d& step) const {
   HierarchicalSplineSpace moved = space_;
   moved.SetValues(Moved(moved.Values(), step));
   return moved.Surface();
+}
+
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver,
+                       SolveReport report) {
+  LevelSolution solution{.net = view.start, .summary = {}};
+  LevelSolve solve(std::move(view), terms, solver);
+  solution.summary = solve.FinalSolve(report);
+  solution.net.vertices = solve.Values().vertices;
+  return solution;
+}
+
+PatchCoverage MakeCoverage(const std::vector<int>& counts) {
+  std::vector<double> filled(counts.begin(), counts.end());
+  const auto empty = static_cast<int>(std::erase(filled, 0));
+  PatchCoverage coverage{.patches = static_cast<int>(counts.size()), .empty_patches = empty};
+  if (!filled.empty()) {
+    coverage.median_patch_points = Quantile(filled, 0.5);
+  }
+  return coverage;
 }
 
 }  // namespace semblance

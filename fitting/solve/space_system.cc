@@ -4,13 +4,14 @@
 #include <algorithm>
 #include <utility>
 
-#include "fitting/least_squares/triangle_sum.h"
+#include "fitting/least_squares/sparse_factor.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {
 namespace {
 
-// A patch as its parent sees it, in the basis of its own sixteen vertices.
+// The contributions of a patch and all of its descendants, in the basis of the patch's sixteen
+// vertices.
 struct PatchPart {
   ElementStiffness matrix = ElementStiffness::Zero();
   PatchMatrix right = PatchMatrix::Zero();
@@ -52,9 +53,9 @@ class Assembler {
   PatchPart Leaf(const QuadtreeNode& node) const {
     PatchPart part;
     if (point_scale_ > 0 && node.range.size() > 0) {
-      part.right = point_scale_ * space_.ResidualOf(node);
+      part.right = point_scale_ * space_.LeafResidual(node);
       if (both_) {
-        part.matrix = point_scale_ * space_.GramOf(node);
+        part.matrix = point_scale_ * space_.LeafGram(node);
       }
     }
     if (!forms_.empty()) {
@@ -78,10 +79,10 @@ class Assembler {
       if (both_) {
         part.matrix += refine.transpose() * children[c].matrix * refine;
         for (const int dof : space_.nodes()[node.children + c].dofs) {
-          Note(RowOf(dof), part);
+          AddFinerRow(RowOfDof(dof), part);
         }
         for (const int row : children[c].finer) {
-          Note(row, part);
+          AddFinerRow(row, part);
         }
       }
     }
@@ -102,9 +103,9 @@ class Assembler {
     }
   }
 
-  int RowOf(int dof) const { return dof >= 0 ? space_.dofs()[dof].row : -1; }
+  int RowOfDof(int dof) const { return dof >= 0 ? space_.dofs()[dof].row : -1; }
 
-  void Note(int row, PatchPart& part) {
+  void AddFinerRow(int row, PatchPart& part) {
     if (row >= 0 && column_of_[row] < 0) {
       column_of_[row] = static_cast<int>(part.finer.size());
       part.finer.push_back(row);
@@ -115,7 +116,7 @@ class Assembler {
                 const ElementStiffness& refine, PatchPart& part) const {
     const ElementStiffness own = refine.transpose() * of_child.matrix;
     for (int k = 0; k < 16; ++k) {
-      if (const int row = RowOf(child.dofs[k]); row >= 0) {
+      if (const int row = RowOfDof(child.dofs[k]); row >= 0) {
         part.cross.col(column_of_[row]) += own.col(k);
       }
     }
@@ -131,7 +132,7 @@ class Assembler {
   void Scatter(const QuadtreeNode& node, const PatchPart& part) {
     std::array<int, 16> rows;
     std::transform(node.dofs.begin(), node.dofs.end(), rows.begin(),
-                   [&](int dof) { return RowOf(dof); });
+                   [&](int dof) { return RowOfDof(dof); });
     for (int k = 0; k < 16; ++k) {
       if (rows[k] < 0) {
         continue;
@@ -153,12 +154,13 @@ class Assembler {
   double point_scale_;
   std::span<const LevelStiffness> forms_;
   bool both_;
-  std::vector<int> column_of_;  // of an unknown in the part at hand
+  std::vector<int> column_of_;  // column of each unknown in the present part; -1: none
   TriangleSum lower_;
   NormalSystem system_;
 };
 
-// The misfit is taken row by row, which is more precise than the difference of A^T B and A^T A X.
+// Adds rows to normal equations. The misfit is computed row by row, which is more precise than the
+// difference A^T B - A^T A X.
 class RowSystem final : public RowSink {
  public:
   RowSystem(const ControlNet& net, NormalSystem& system)
@@ -202,7 +204,7 @@ std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::spa
           [&]<class T>(const T& t) {
             if constexpr (std::is_same_v<T, SmoothnessTerm> || std::is_same_v<T, MembraneTerm>) {
               const ElementStiffness form =
-                  StiffnessOf(t, lengths_mm, shape.PatchesU(level), shape.PatchesV(level));
+                  PatchStiffness(t, lengths_mm, shape.PatchesU(level), shape.PatchesV(level));
               (t.of == SmoothnessOf::kSurface ? forms[level].surface : forms[level].displacement) +=
                   form;
             }
@@ -213,7 +215,7 @@ std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::spa
   return forms;
 }
 
-double EnergyOf(const HierarchicalSplineSpace& space, std::span<const LevelStiffness> forms) {
+double TotalEnergy(const HierarchicalSplineSpace& space, std::span<const LevelStiffness> forms) {
   double energy = 0;
   for (const QuadtreeNode& node : space.nodes()) {
     if (node.children < 0) {
@@ -231,8 +233,8 @@ NormalSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
   return Assembler(space, point_scale, forms, part).Run();
 }
 
-void AddRowsOf(std::span<const Term> terms, const LevelView& view, const ControlNet& net,
-               SystemPart part, NormalSystem& system) {
+void AddTermRows(std::span<const Term> terms, const LevelView& view, const ControlNet& net,
+                 SystemPart part, NormalSystem& system) {
   RowSystem rows(net, system);
   AddRows(terms, view, rows);
   if (part == SystemPart::kBoth) {

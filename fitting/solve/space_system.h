@@ -12,38 +12,37 @@
 
 namespace semblance {
 
-// In steps from where a surface stands, the same matrix for x, y and z.
+// Normal equations for a step from the present surface; x, y and z share the matrix.
 struct NormalSystem {
-  SparseMatrix lower;      // triangle
-  Eigen::MatrixX3d right;  // unknowns x 3: half of minus the gradient
+  SparseMatrix lower;      // lower triangle
+  Eigen::MatrixX3d right;  // unknowns x 3: -gradient / 2
 };
 
-// The energies of one level's patches; x^T form x for each coordinate.
+// The energies of one level's patches; each is x^T form x for one coordinate x of the vertices.
 struct LevelStiffness {
-  ElementStiffness displacement =
-      ElementStiffness::Zero();  // of the displacement from the template
+  ElementStiffness displacement = ElementStiffness::Zero();  // x: displacement from the template
   ElementStiffness surface = ElementStiffness::Zero();
 };
 
-// One per level, of the smoothness and membrane terms together. lengths_mm: what [0,1] stands for
-// along u and v.
+// The energies of the smoothness and membrane terms together, one form per level. lengths_mm:
+// lengths of [0,1] along u and v.
 std::vector<LevelStiffness> StiffnessByLevel(const HSplineShape& shape, std::span<const Term> terms,
                                              const Vec2& lengths_mm);
 
-// Sum of the energies over the surface, mm^2.
-double EnergyOf(const HierarchicalSplineSpace& space, std::span<const LevelStiffness> forms);
+// The sum of the energies over the surface, mm^2.
+double TotalEnergy(const HierarchicalSplineSpace& space, std::span<const LevelStiffness> forms);
 
 enum class SystemPart { kBoth, kRight };
 
-// Of point_scale * sum w |e|^2 + the energies, over the unknowns; the space must be measured. Each
-// leaf gives its sixteen vertices' matrix, which is taken up the quadtree by the refinement
-// matrices, so that the work grows with the patches and not with the points or the pairs of levels.
-// forms: one per level, or none. kRight leaves the matrix 0 x 0.
+// Assembles the normal equations of point_scale * sum w |e|^2 + the energies over the unknowns of a
+// measured space. The matrix of each leaf's sixteen vertices is carried up the quadtree by the
+// refinement matrices, so the work grows with the number of patches, not with the points or the
+// pairs of levels. forms: one per level, or empty. kRight leaves the matrix 0 x 0.
 NormalSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
                       std::span<const LevelStiffness> forms, SystemPart part = SystemPart::kBoth);
 
-// Adds the rows of other terms that treat x, y and z alike, as they stand to a net of the unknowns.
-void AddRowsOf(std::span<const Term> terms, const LevelView& view, const ControlNet& net,
-               SystemPart part, NormalSystem& system);
+// Adds the rows of terms (RowTerm) to the normal equations. net: the present unknowns.
+void AddTermRows(std::span<const Term> terms, const LevelView& view, const ControlNet& net,
+                 SystemPart part, NormalSystem& system);
 
 }  // namespace semblance

@@ -8,18 +8,16 @@
 #include <utility>
 
 #include "fitting/least_squares/sparse_factor.h"
-#include "fitting/solve/selected_inverse.h"
 #include "fitting/solve/space_system.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
-#include "fitting/space/spline_element.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
 
-std::vector<Observation> PointsThatCount(const AttributeColumns& points,
-                                         std::span<const std::uint32_t> left_out) {
+std::vector<Observation> UsedPoints(const AttributeColumns& points,
+                                    std::span<const std::uint32_t> left_out) {
   std::vector<Observation> observations;
   observations.reserve(points.uv.size());
   auto next = left_out.begin();
@@ -37,10 +35,10 @@ std::vector<Observation> PointsThatCount(const AttributeColumns& points,
   return observations;
 }
 
-// Of the sixteen vertices of a patch, from that of all unknowns. known: what is to be taken from
-// it, as a product of these rows with each other.
-Matrix16 CovarianceOf(const SplineElement& element, const SelectedInverse& inverse,
-                      const Eigen::MatrixXd& known) {
+// The covariance of a patch's sixteen vertices, from that of all unknowns. The product known *
+// known^T is subtracted from the latter.
+Matrix16 PatchCovariance(const SplineElement& element, const SelectedInverse& inverse,
+                         const Eigen::MatrixXd& known) {
   const auto count = static_cast<Eigen::Index>(element.dofs.size());
   Eigen::MatrixXd of_dofs(count, count);
   for (Eigen::Index a = 0; a < count; ++a) {
@@ -55,11 +53,11 @@ Matrix16 CovarianceOf(const SplineElement& element, const SelectedInverse& inver
              : Matrix16(element.extraction * of_dofs * element.extraction.transpose());
 }
 
-// Where finer vertices hang on coarser ones, some surfaces can be written in several ways, which
-// leaves the matrix without an inverse. A little on its diagonal chooses one of them; the functions
-// at a place do not see which.
-SparseMatrix Raised(SparseMatrix lower) {
-  constexpr double kShift = 1e-10;
+// Adds a small shift to the diagonal. On several levels some surfaces can be written in several
+// ways, so the matrix has no inverse. The shift selects one of them; sigma does not depend on the
+// selection.
+SparseMatrix Shifted(SparseMatrix lower) {
+  constexpr double kShift = 1e-10;  // far above round-off, far below the points' contributions
   const double shift = kShift * std::max(lower.diagonal().mean(), 1e-300);
   for (int k = 0; k < lower.rows(); ++k) {
     lower.coeffRef(k, k) += shift;
@@ -67,7 +65,7 @@ SparseMatrix Raised(SparseMatrix lower) {
   return lower;
 }
 
-// The unknowns' functions at a place, a column each.
+// The B-splines of the unknowns at each place, one column per place.
 Eigen::MatrixXd FunctionsAt(std::span<const Vec2> places, const SplineElements& elements,
                             Eigen::Index unknowns) {
   Eigen::MatrixXd functions = Eigen::MatrixXd::Zero(unknowns, std::ssize(places));
@@ -85,10 +83,10 @@ Eigen::MatrixXd FunctionsAt(std::span<const Vec2> places, const SplineElements& 
   return functions;
 }
 
-// What equations C x = d that hold take from the inverse of H, as P P^T: H^-1 C^T (C H^-1
-// C^T)^-1/2. What equations say twice counts once.
-Eigen::MatrixXd TakenBy(const Eigen::MatrixXd& equations, const SparseMatrix& lower) {
-  constexpr double kDependent = 1e-9;
+// The factor P = H^-1 C^T (C H^-1 C^T)^-1/2 for equations C x = d that hold: H^-1 is reduced by P
+// P^T. Dependent equations are used once.
+Eigen::MatrixXd KnownPart(const Eigen::MatrixXd& equations, const SparseMatrix& lower) {
+  constexpr double kDependent = 1e-9;  // of the largest eigenvalue; smaller ones are round-off
   if (equations.cols() == 0) {
     return equations;
   }
@@ -125,15 +123,15 @@ struct SurfaceSigma::Model {
     const SparseMatrix of_points = Assemble(space, scale, {}).lower;
     const SparseMatrix energy =
         Assemble(space, 0, StiffnessByLevel(space.shape(), smooth, options.lengths_mm)).lower;
-    const SparseMatrix normal = Raised(of_points + energy);
+    const SparseMatrix normal = Shifted(of_points + energy);
     const SelectedInverse inverse(normal);
     if (!inverse.usable()) {
       throw InputError("sigma: rounding leaves no factor of the fit's matrix; write sigma: false");
     }
     const Eigen::MatrixXd known =
-        TakenBy(FunctionsAt(options.met, elements, normal.rows()), normal);
+        KnownPart(FunctionsAt(options.met, elements, normal.rows()), normal);
     for (int e = 0; e < elements.size(); ++e) {
-      covariances.push_back(CovarianceOf(elements[e], inverse, known));
+      covariances.push_back(PatchCovariance(elements[e], inverse, known));
     }
     variance = options.noise_mm * options.noise_mm / count;
     determined = -known.cwiseProduct(of_points.selfadjointView<Eigen::Lower>() * known).sum();
@@ -150,7 +148,7 @@ struct SurfaceSigma::Model {
   PointCloud cloud;
   HierarchicalSplineSpace space;
   SplineElements elements;
-  std::vector<Matrix16> covariances;  // of each element's vertices, for a noise of 1
+  std::vector<Matrix16> covariances;  // of each element's vertices, for noise 1
   double variance = kNaN, determined = kNaN;
 };
 
@@ -160,7 +158,7 @@ SurfaceSigma::SurfaceSigma(const HSplineSurface& surface, const AttributeColumns
       !options.lengths_mm.allFinite()) {
     throw InputError("sigma: the fit has found no noise or smoothness; write sigma: false");
   }
-  model_ = std::make_unique<Model>(surface, PointsThatCount(points, left_out), options);
+  model_ = std::make_unique<Model>(surface, UsedPoints(points, left_out), options);
 }
 
 SurfaceSigma::~SurfaceSigma() = default;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far a surface that was fitted to scattered points may be off, place by place.
+// The standard deviation of a surface that was fitted to scattered points, at any place.
 #pragma once
 
 #include <cstdint>
@@ -13,40 +13,44 @@
 
 namespace semblance {
 
-// What a fit was made of, and what it has found.
+// The parameters of the fit.
 struct SigmaOptions {
-  double noise_mm = kNaN;    // standard deviation of a point along one axis; of points with weights
-                             // the root of their weighted mean square (AutoReport)
-  double weight = kNaN;      // of the thin-plate energy (SmoothnessTerm, length_mm 1), > 0 or 0
-  double stretch = 1;        // likewise
-  double direction_deg = 0;  // likewise
-  Vec2 lengths_mm = Vec2::Constant(kNaN);  // what [0,1] stands for along u and v
-  std::span<const Vec2> met = {};          // where the surface is held to exact points
+  // Standard deviation of a point along one axis; for points with weights the root of the weighted
+  // mean square (AutoReport).
+  double noise_mm = kNaN;
+  double weight = kNaN;      // weight of the thin-plate energy (SmoothnessTerm, length_mm 1), >= 0
+  double stretch = 1;        // of the same SmoothnessTerm
+  double direction_deg = 0;  // of the same SmoothnessTerm
+  Vec2 lengths_mm = Vec2::Constant(kNaN);  // lengths of [0,1] along u and v
+  std::span<const Vec2> met = {};          // (u,v) of exact points
 };
 
-// The standard deviation along one axis of the penalised least squares sum w |e|^2 / sum w + weight
-// * energy, at (u,v): noise sqrt(n^T H^-1 n / count), H being its normal matrix over the unknowns
-// and n their functions at (u,v). These are the Bayesian intervals of Wahba (1983): smoothness is
-// what is known before of the surface, so that they hold its bias too, on the mean over the domain
-// (Nychka 1988) rather than at each place, and grow where points are few. Where the surface is
-// held, by the equations C, H^-1 becomes H^-1 - H^-1 C^T (C H^-1 C^T)^-1 C H^-1. They know nothing
-// of detail finer than the vertices, of tangents that are held, nor of errors that neighbours
-// share.
+// The standard deviation along one axis of the minimiser of sum w |e|^2 / sum w + weight * energy:
+//
+//   sigma(u,v) = noise sqrt(n^T H^-1 n / count),
+//
+// where H is the normal matrix over the unknowns, n holds their B-splines at (u,v), and count is
+// the number of points. These are the Bayesian intervals of Wahba (1983), with smoothness as the
+// prior. They include the bias on average over the domain (Nychka 1988), not at each place, and
+// grow where points are few. With exact points, given by the equations C, H^-1 is replaced by H^-1
+// - H^-1 C^T (C H^-1 C^T)^-1 C H^-1. Not included are detail finer than the vertices, held
+// tangents, and errors that neighbouring points share.
 class SurfaceSigma {
  public:
   // surface: its vertices are the unknowns. points: those of the fit, without columns. left_out:
-  // indices of points that do not count, ascending. Where neither points nor smoothness (a weight
-  // of 0) determine the surface, sigma is some thousand times as large as elsewhere. Throws
-  // InputError for numbers that are not finite, and no point that counts.
+  // ascending indices of points without effect. If neither points nor smoothness (weight 0)
+  // determine the surface, sigma is about a thousand times as large as elsewhere. Throws InputError
+  // for numbers that are not finite, or if no point is left.
   SurfaceSigma(const HSplineSurface& surface, const AttributeColumns& points,
                std::span<const std::uint32_t> left_out, const SigmaOptions& options);
   ~SurfaceSigma();
   SurfaceSigma(SurfaceSigma&&) noexcept;
   SurfaceSigma& operator=(SurfaceSigma&&) noexcept;
 
-  // mm; one per (u,v), each in [0,1] x [0,1].
+  // sigma in mm at each (u,v) in [0,1] x [0,1].
   std::vector<double> At(std::span<const Vec2> uv) const;
-  // Parameters per coordinate that the points determine: the trace of the influence matrix.
+  // The number of parameters per coordinate that the points determine: the trace of the influence
+  // matrix.
   double degrees_of_freedom() const;
 
  private:

@@ -10,10 +10,11 @@
 namespace semblance {
 namespace {
 
-// Whether a leaf has so few points that its sums are made point by point.
+// Returns whether a leaf has so few points that summing point by point is faster than by moments.
+// Both give the same sums, so the limit affects time alone.
 bool IsSparse(const QuadtreeNode& leaf) { return leaf.range.size() < 32; }
 
-PatchMatrix MatrixOf(const std::array<Vec3, 16>& vertices) {
+PatchMatrix StackVertices(const std::array<Vec3, 16>& vertices) {
   PatchMatrix matrix;
   for (int k = 0; k < 16; ++k) {
     matrix.row(k) = vertices[k];
@@ -21,28 +22,28 @@ PatchMatrix MatrixOf(const std::array<Vec3, 16>& vertices) {
   return matrix;
 }
 
-// The vertex among those of a patch that holds it.
+// A vertex as one of the sixteen of a patch.
 struct PatchSlot {
   PatchId patch;
   int index;  // [a + 4 b]
 };
 
-PatchSlot SlotOf(const HSplineShape& shape, const VertexId& v) {
+PatchSlot FindSlot(const HSplineShape& shape, const VertexId& v) {
   const int i = std::min(v.i, shape.PatchesU(v.level) - 1),
             j = std::min(v.j, shape.PatchesV(v.level) - 1);
   return {{v.level, i, j}, v.i - i + 4 * (v.j - j)};
 }
 
-// A vertex where the coarser level alone would have it.
+// The position of a vertex on the refined net of the coarser level.
 Vec3 RefinedPosition(const HSplineSurface& surface, const VertexId& v) {
-  const PatchSlot slot = SlotOf(surface.shape(), v);
+  const PatchSlot slot = FindSlot(surface.shape(), v);
   const PatchId parent{v.level - 1, slot.patch.i / 2, slot.patch.j / 2};
   return RefinePatch(surface.PatchVertices(parent), slot.patch.i % 2, slot.patch.j % 2)[slot.index];
 }
 
-// What a vertex has as a dof.
-Vec3 ValueIn(const HSplineSurface& surface, const VertexId& v) {
-  const PatchSlot slot = SlotOf(surface.shape(), v);
+// The value of a vertex as a dof (ControlDof::value).
+Vec3 DofValue(const HSplineSurface& surface, const VertexId& v) {
+  const PatchSlot slot = FindSlot(surface.shape(), v);
   const Vec3 place = surface.PatchVertices(slot.patch)[slot.index];
   return v.level == 0 ? place : Vec3(place - RefinedPosition(surface, v));
 }
@@ -67,7 +68,7 @@ HierarchicalSplineSpace::HierarchicalSplineSpace(const HSplineSurface& start,
   }
   std::vector<VertexId> edits;
   for (const auto& [vertex, offset] : rest.Offsets()) {
-    edits.push_back(vertex);  // so that every leaf knows the template's shape
+    edits.push_back(vertex);  // every leaf can then represent the template's shape
   }
   for (const auto& [vertex, offset] : start.Offsets()) {
     edits.push_back(vertex);
@@ -75,7 +76,7 @@ HierarchicalSplineSpace::HierarchicalSplineSpace(const HSplineSurface& start,
   Edit(edits);
   for (ControlDof& dof : dofs_) {
     if (dof.vertex.level > 0) {
-      dof.value = ValueIn(start, dof.vertex);
+      dof.value = DofValue(start, dof.vertex);
     }
   }
   Refresh();
@@ -91,7 +92,7 @@ int HierarchicalSplineSpace::finest() const {
 
 int HierarchicalSplineSpace::AddDof(const VertexId& vertex, const Vec3& value) {
   const int next = static_cast<int>(dofs_.size());
-  const auto [at, added] = dof_of_.emplace(KeyOf(vertex.level, vertex.i, vertex.j), next);
+  const auto [at, added] = dof_of_.emplace(MakeKey(vertex.level, vertex.i, vertex.j), next);
   if (added) {
     dofs_.push_back({vertex, value});
   }
@@ -99,23 +100,23 @@ int HierarchicalSplineSpace::AddDof(const VertexId& vertex, const Vec3& value) {
 }
 
 bool HierarchicalSplineSpace::IsEdited(const VertexId& vertex) const {
-  return dof_of_.contains(KeyOf(vertex.level, vertex.i, vertex.j));
+  return dof_of_.contains(MakeKey(vertex.level, vertex.i, vertex.j));
 }
 
-int HierarchicalSplineSpace::RowOf(const VertexId& vertex) const {
-  const auto found = dof_of_.find(KeyOf(vertex.level, vertex.i, vertex.j));
+int HierarchicalSplineSpace::FindRow(const VertexId& vertex) const {
+  const auto found = dof_of_.find(MakeKey(vertex.level, vertex.i, vertex.j));
   return found == dof_of_.end() ? -1 : dofs_[found->second].row;
 }
 
 int HierarchicalSplineSpace::AddNode(const PatchId& patch, int parent,
                                      const PointCloud::Range& range) {
   const int index = static_cast<int>(nodes_.size());
-  node_of_.emplace(KeyOf(patch.level, patch.i, patch.j), index);
+  node_of_.emplace(MakeKey(patch.level, patch.i, patch.j), index);
   QuadtreeNode& node = nodes_.emplace_back();
   node.patch = patch;
   node.parent = parent;
   node.range = range;
-  node.rest = MatrixOf(rest_.PatchVertices(patch));
+  node.rest = StackVertices(rest_.PatchVertices(patch));
   return index;
 }
 
@@ -130,7 +131,7 @@ void HierarchicalSplineSpace::Split(int index) {
 }
 
 int HierarchicalSplineSpace::EnsureNode(const PatchId& patch) {
-  const Key key = KeyOf(patch.level, patch.i, patch.j);
+  const Key key = MakeKey(patch.level, patch.i, patch.j);
   if (const auto found = node_of_.find(key); found != node_of_.end()) {
     return found->second;
   }
@@ -159,7 +160,8 @@ void HierarchicalSplineSpace::Edit(std::span<const VertexId> vertices) {
   Refresh();
 }
 
-// Vertex i of a level is a sum of 2 i - 3 .. 2 i + 1 of the next.
+// Invariant 5. The B-spline of vertex i is a sum of those of vertices 2 i - 3 .. 2 i + 1 of the
+// next level.
 bool HierarchicalSplineSpace::IsCovered(const VertexId& v) const {
   const int level = v.level + 1;
   if (level > shape_.max_level) {
@@ -186,13 +188,14 @@ void HierarchicalSplineSpace::LinkDofs() {
     const PatchId& p = node.patch;
     for (int k = 0; k < 16; ++k) {
       const int i = shape_.Column(p.level, p.i + k % 4), j = p.j + k / 4;
-      const auto found = dof_of_.find(KeyOf(p.level, i, j));
+      const auto found = dof_of_.find(MakeKey(p.level, i, j));
       node.dofs[k] = found == dof_of_.end() ? -1 : found->second;
     }
   }
 }
 
-// Parents stand before their children.
+// Restores invariant 4, and marks leaves whose vertices changed as not measured. By invariant 1 a
+// parent is up to date before its children.
 void HierarchicalSplineSpace::Refresh() {
   for (QuadtreeNode& node : nodes_) {
     const PatchId& p = node.patch;
@@ -227,7 +230,7 @@ void HierarchicalSplineSpace::Measure(std::vector<double> factors, int threads,
   std::vector<int> stale;
   for (std::size_t k = 0; k < nodes_.size(); ++k) {
     const QuadtreeNode& node = nodes_[k];
-    const bool fresh = node.measured && node.has_moments;  // without factors, that is
+    const bool fresh = node.measured && node.has_moments;  // measured with factors 1
     if (node.children < 0 && (!fresh || !factors_.empty() || squares != nullptr)) {
       stale.push_back(static_cast<int>(k));
     }
@@ -237,7 +240,7 @@ void HierarchicalSplineSpace::Measure(std::vector<double> factors, int threads,
   }
   ParallelFor(stale.size(), threads, 1, [&](std::size_t k) {
     QuadtreeNode& node = nodes_[stale[k]];
-    MeasureLeaf({.factors = FactorsOf(node),
+    MeasureLeaf({.factors = LeafFactors(node),
                  .squares = squares == nullptr ? nullptr : squares->data() + node.range.begin},
                 node);
   });
@@ -259,16 +262,16 @@ void HierarchicalSplineSpace::MeasureLeaf(const PointFactors& each, QuadtreeNode
   leaf.measured = true;
 }
 
-const double* HierarchicalSplineSpace::FactorsOf(const QuadtreeNode& leaf) const {
+const double* HierarchicalSplineSpace::LeafFactors(const QuadtreeNode& leaf) const {
   return factors_.empty() ? nullptr : factors_.data() + leaf.range.begin;
 }
 
-Matrix16 HierarchicalSplineSpace::GramOf(const QuadtreeNode& leaf) const {
-  return IsSparse(leaf) ? GramOfPoints(cloud_.Of(leaf.range), leaf.patch, FactorsOf(leaf))
+Matrix16 HierarchicalSplineSpace::LeafGram(const QuadtreeNode& leaf) const {
+  return IsSparse(leaf) ? GramOfPoints(cloud_.Of(leaf.range), leaf.patch, LeafFactors(leaf))
                         : GramOfMoments(leaf.sums);
 }
 
-PatchMatrix HierarchicalSplineSpace::ResidualOf(const QuadtreeNode& leaf) const {
+PatchMatrix HierarchicalSplineSpace::LeafResidual(const QuadtreeNode& leaf) const {
   return IsSparse(leaf) ? ResidualOfPoints(leaf.sums) : ResidualOfMoments(leaf.sums);
 }
 
@@ -297,7 +300,7 @@ ControlNet HierarchicalSplineSpace::RestValues() const {
   ControlNet net{.columns = rows_, .rows = 1, .vertices = {}};
   for (const ControlDof& dof : dofs_) {
     if (dof.row >= 0) {
-      net.vertices.push_back(ValueIn(rest_, dof.vertex));
+      net.vertices.push_back(DofValue(rest_, dof.vertex));
     }
   }
   return net;
@@ -319,7 +322,8 @@ double HierarchicalSplineSpace::Squares() const {
   return sum;
 }
 
-// Level by level: an offset is measured from the next coarser surface, in its frame.
+// Proceeds level by level, because an offset is measured from the next coarser surface, in its
+// frame.
 HSplineSurface HierarchicalSplineSpace::Surface() const {
   ControlNet net{shape_.Columns(0), shape_.Rows(0), {}};
   std::vector<std::vector<const ControlDof*>> levels(shape_.max_level + 1);
@@ -343,6 +347,66 @@ HSplineSurface HierarchicalSplineSpace::Surface() const {
     surface.SetOffsets(offsets);
   }
   return surface;
+}
+
+namespace {
+
+SplineElement MakeElement(const HierarchicalSplineSpace& space, int leaf) {
+  const std::vector<QuadtreeNode>& nodes = space.nodes();
+  SplineElement element;
+  element.patch = nodes[leaf].patch;
+  element.patches_u = space.shape().PatchesU(element.patch.level);
+  element.patches_v = space.shape().PatchesV(element.patch.level);
+  element.rest = nodes[leaf].rest;
+  std::vector<Eigen::Matrix<double, 16, 1>> columns;
+  Matrix16 refinement = Matrix16::Identity();  // leaf's vertices from those of `node`
+  for (int node = leaf; node >= 0; node = nodes[node].parent) {
+    for (int k = 0; k < 16; ++k) {
+      const int dof = nodes[node].dofs[k];
+      if (dof < 0) {
+        continue;
+      }
+      const ControlDof& unknown = space.dofs()[dof];
+      if (unknown.row < 0) {
+        element.fixed += refinement.col(k) * unknown.value.transpose();
+      } else {
+        element.dofs.push_back(unknown.row);
+        columns.emplace_back(refinement.col(k));
+      }
+    }
+    const PatchId& patch = nodes[node].patch;
+    refinement = refinement * RefinementMatrix(patch.i % 2, patch.j % 2);
+  }
+  element.extraction.resize(16, static_cast<Eigen::Index>(columns.size()));
+  for (std::size_t k = 0; k < columns.size(); ++k) {
+    element.extraction.col(static_cast<Eigen::Index>(k)) = columns[k];
+  }
+  return element;
+}
+
+}  // namespace
+
+PatchMatrix SplineElement::Vertices(const ControlNet& net) const {
+  Eigen::MatrixX3d values(dofs.size(), 3);
+  for (std::size_t k = 0; k < dofs.size(); ++k) {
+    values.row(static_cast<Eigen::Index>(k)) = net.vertices[dofs[k]];
+  }
+  return IsIdentity() ? PatchMatrix(values) : PatchMatrix(extraction * values + fixed);
+}
+
+SplineElements::SplineElements(const HierarchicalSplineSpace& space)
+    : space_(space), element_of_(space.nodes().size(), -1) {
+  for (const ControlDof& dof : space.dofs()) {
+    if (dof.row >= 0) {
+      vertices_.push_back(dof.vertex);
+    }
+  }
+  for (std::size_t k = 0; k < space.nodes().size(); ++k) {
+    if (space.nodes()[k].children < 0) {
+      element_of_[k] = size();
+      elements_.push_back(MakeElement(space, static_cast<int>(k)));
+    }
+  }
 }
 
 }  // namespace semblance

@@ -12,11 +12,12 @@ namespace {
 
 using Vec4 = double __attribute__((vector_size(32)));
 
-// Coefficients of 1, z, z^2, z^3, z = 2 s - 1, of the four B-spline segments on s in [0,1].
+// 48 times the coefficients of 1, z, z^2, z^3 of the four B-spline segments on s in [0,1], with z =
+// 2 s - 1.
 constexpr double kSegment[4][4] = {
     {1, -3, 3, -1}, {23, -15, -3, 3}, {23, 15, -3, -3}, {1, 3, 3, 1}};
 
-// Row k: coefficients of z_u^a z_v^b, at a + 4 b, of the weight of vertex k.
+// Row k holds the coefficients of z_u^a z_v^b, at a + 4 b, of the B-spline of vertex k.
 Matrix16 MakePowers() {
   Matrix16 powers;
   for (int k = 0; k < 16; ++k) {
@@ -27,19 +28,19 @@ Matrix16 MakePowers() {
   return powers;
 }
 
-const Matrix16& PowersOfVertices() {
+const Matrix16& VertexPowers() {
   static const Matrix16 powers = MakePowers();
   return powers;
 }
 
 struct Polynomial {
-  Vec4 power[16];  // of z_u^a z_v^b at a + 4 b
+  Vec4 power[16];  // coefficients of z_u^a z_v^b at a + 4 b
   double scale;    // z_u = x * scale - shift_u
   double shift_u, shift_v;
 };
 
-Polynomial PolynomialOf(const PatchId& patch, const PatchMatrix& vertices) {
-  const PatchMatrix powers = PowersOfVertices().transpose() * vertices;
+Polynomial MakePolynomial(const PatchId& patch, const PatchMatrix& vertices) {
+  const PatchMatrix powers = VertexPowers().transpose() * vertices;
   Polynomial p{};
   for (int m = 0; m < 16; ++m) {
     p.power[m] = Vec4{powers(m, 0), powers(m, 1), powers(m, 2), 0};
@@ -50,9 +51,10 @@ Polynomial PolynomialOf(const PatchId& patch, const PatchMatrix& vertices) {
   return p;
 }
 
-constexpr double kOutlier = 0.5;  // a point of a smaller factor
+// A point whose loss halves its weight, or more, is an outlier and must not cause refinement.
+constexpr double kOutlierFactor = 0.5;
 
-inline double FactorOf(const double* factors, std::size_t k) {
+inline double Factor(const double* factors, std::size_t k) {
   return factors == nullptr ? 1 : factors[k];
 }
 
@@ -93,7 +95,7 @@ SEMBLANCE_WIDE_256 void Accumulate(const Batch& batch, const Polynomial& p, Patc
     const Vec4 ee = e * e;
     const double square = ee[0] + ee[1] + ee[2];
     sums.squares += w * square;
-    const bool outlier = batch.factors != nullptr && batch.factors[k] < kOutlier;
+    const bool outlier = batch.factors != nullptr && batch.factors[k] < kOutlierFactor;
     sums.largest = !outlier && square > sums.largest ? square : sums.largest;
     if (batch.squares != nullptr) {
       batch.squares[k] = square;
@@ -137,9 +139,9 @@ SEMBLANCE_WIDE_256 void AccumulateByVertex(const Batch& batch, const PatchId& pa
     const Vec4 e = values - (v[0] * Along(u, vertex) + v[1] * Along(u, vertex + 4) +
                              v[2] * Along(u, vertex + 8) + v[3] * Along(u, vertex + 12));
     const Vec4 ee = e * e;
-    const double square = ee[0] + ee[1] + ee[2], factor = FactorOf(batch.factors, k);
+    const double square = ee[0] + ee[1] + ee[2], factor = Factor(batch.factors, k);
     sums.squares += p.weight() * factor * square;
-    sums.largest = factor >= kOutlier && square > sums.largest ? square : sums.largest;
+    sums.largest = factor >= kOutlierFactor && square > sums.largest ? square : sums.largest;
     if (batch.squares != nullptr) {
       batch.squares[k] = square;
     }
@@ -183,7 +185,7 @@ void AddMoments(std::span<const CloudPoint> points, const PatchId& patch,
                 const PatchMatrix& vertices, bool moments, const PointFactors& each,
                 PatchMoments& sums) {
   Accumulate({points.data(), points.size(), each.factors, each.squares, moments},
-             PolynomialOf(patch, vertices), sums);
+             MakePolynomial(patch, vertices), sums);
 }
 
 Matrix16 GramOfMoments(const PatchMoments& sums) {
@@ -193,11 +195,11 @@ Matrix16 GramOfMoments(const PatchMoments& sums) {
       of_powers(k, l) = sums.moments[k / 4 + l / 4][k % 4 + l % 4];
     }
   }
-  return PowersOfVertices() * of_powers * PowersOfVertices().transpose();
+  return VertexPowers() * of_powers * VertexPowers().transpose();
 }
 
 PatchMatrix ResidualOfMoments(const PatchMoments& sums) {
-  return PowersOfVertices() * ResidualOfPoints(sums);
+  return VertexPowers() * ResidualOfPoints(sums);
 }
 
 void AddPoints(std::span<const CloudPoint> points, const PatchId& patch,
@@ -211,7 +213,7 @@ Matrix16 GramOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
   Matrix16 gram = Matrix16::Zero();
   for (std::size_t k = 0; k < points.size(); ++k) {
     const VertexWeights weights = WeightsAt(points[k], patch);
-    gram.noalias() += points[k].weight() * FactorOf(factors, k) * weights * weights.transpose();
+    gram.noalias() += points[k].weight() * Factor(factors, k) * weights * weights.transpose();
   }
   return gram;
 }

@@ -10,14 +10,16 @@
 namespace semblance {
 namespace {
 
-constexpr int kBits = 18;  // of the place in a level-0 patch, along each side
+// Bits of the place in a level-0 patch, along each side. A key has 2 * 18 of them and 28 bits for
+// the patch.
+constexpr int kBits = 18;
 
 struct Key {
   std::uint64_t value;
   std::uint32_t index;
 };
 
-// Bits 0, 1, 2 .. of x at 0, 2, 4 ..
+// Moves bits 0, 1, 2 .. of x to positions 0, 2, 4 ..
 std::uint64_t Spread(std::uint64_t x) {
   x = (x | x << 16) & 0x0000FFFF0000FFFFu;
   x = (x | x << 8) & 0x00FF00FF00FF00FFu;
@@ -31,20 +33,20 @@ std::uint64_t Cell(double s) {
   return std::min(static_cast<std::uint64_t>(s * kCells), (std::uint64_t{1} << kBits) - 1);
 }
 
-std::uint64_t PatchOf(const HSplineShape& shape, const PatchPoint& at) {
+std::uint64_t PatchNumber(const HSplineShape& shape, const PatchPoint& at) {
   return at.patch.i + static_cast<std::uint64_t>(shape.patches_u) * at.patch.j;
 }
 
-Key KeyOf(const HSplineShape& shape, const Vec2& uv, std::size_t index) {
+Key MakeKey(const HSplineShape& shape, const Vec2& uv, std::size_t index) {
   const PatchPoint at = PatchPointAt(shape, 0, uv);
   const std::uint64_t s = Cell(at.s), t = Cell(at.t),
                       z = shape.max_level == 0 ? s << kBits | t : Spread(s) | Spread(t) << 1;
-  return {PatchOf(shape, at) << (2 * kBits) | z, static_cast<std::uint32_t>(index)};
+  return {PatchNumber(shape, at) << (2 * kBits) | z, static_cast<std::uint32_t>(index)};
 }
 
-// Stable, digit by digit.
+// Sorts by value, digit by digit, and keeps the order of equal keys.
 void RadixSort(std::vector<Key>& keys) {
-  constexpr int kDigit = 11;
+  constexpr int kDigit = 11;  // bits; 2^11 counters fit into the first-level cache
   std::uint64_t all = 0;
   for (const Key& key : keys) {
     all |= key.value;
@@ -66,7 +68,7 @@ void RadixSort(std::vector<Key>& keys) {
   }
 }
 
-// Points of one cell: by their values.
+// Sorts the points of one cell by their values.
 void SortTies(const auto& points, std::vector<Key>& keys) {
   const auto value = [&](const Key& key) {
     const auto& p = points[key.index];
@@ -84,10 +86,10 @@ void SortTies(const auto& points, std::vector<Key>& keys) {
   }
 }
 
-// Columns, as points one by one.
-class RowsOf {
+// Presents columns as points.
+class PointRows {
  public:
-  explicit RowsOf(const ScatteredPoints& points) : points_(points) {}
+  explicit PointRows(const ScatteredPoints& points) : points_(points) {}
   struct Row {
     const Vec2& uv;
     const Vec3& position;
@@ -106,7 +108,7 @@ std::vector<Key> SortedKeys(const HSplineShape& shape, const auto& points) {
   std::vector<Key> keys;
   keys.reserve(points.size());
   for (std::size_t k = 0; k < points.size(); ++k) {
-    keys.push_back(KeyOf(shape, points[k].uv, k));
+    keys.push_back(MakeKey(shape, points[k].uv, k));
   }
   RadixSort(keys);
   SortTies(points, keys);
@@ -120,7 +122,8 @@ CloudPoint MakePoint(const HSplineShape& shape, const auto& p) {
           .values = {p.position.x(), p.position.y(), p.position.z(), p.weight}};
 }
 
-// Indices in the order of their keys, first by the leading bits alone; starts: of each such bucket.
+// Sorts indices by the leading bits of their keys into buckets. starts: receives the first place of
+// each bucket, and the end.
 std::vector<std::uint32_t> IntoBuckets(std::span<const std::uint64_t> keys, int shift,
                                        std::vector<std::size_t>& starts) {
   const std::uint64_t largest = *std::max_element(keys.begin(), keys.end());
@@ -143,12 +146,12 @@ int ShiftTo16Bits(std::uint64_t bits) {
 
 }  // namespace
 
-// Twelve bytes per point while it is sorted.
+// Needs 12 bytes per point: a key of 8 and an index of 4.
 std::vector<std::uint32_t> CurveOrder(const HSplineShape& shape, const ScatteredPoints& points) {
   std::vector<std::uint64_t> keys(points.size());
   std::uint64_t all = 0;
   for (std::size_t k = 0; k < keys.size(); ++k) {
-    keys[k] = KeyOf(shape, points.uv[k], k).value;
+    keys[k] = MakeKey(shape, points.uv[k], k).value;
     all |= keys[k];
   }
   if (keys.empty()) {
@@ -165,7 +168,7 @@ std::vector<std::uint32_t> CurveOrder(const HSplineShape& shape, const Scattered
     std::sort(bucket.begin(), bucket.end(), [](const Key& a, const Key& c) {
       return std::tie(a.value, a.index) < std::tie(c.value, c.index);
     });
-    SortTies(RowsOf(points), bucket);
+    SortTies(PointRows(points), bucket);
     for (std::size_t n = starts[b]; n < starts[b + 1]; ++n) {
       order[n] = bucket[n - starts[b]].index;
     }
@@ -208,7 +211,7 @@ PointCloud::Range PointCloud::PatchOfLevel0(int i, int j) const {
 PointCloud::Range PointCloud::Child(const Range& parent, const PatchId& child) const {
   const double scale = 1 << child.level;
   const int last_u = shape_.PatchesU(child.level) - 1, last_v = shape_.PatchesV(child.level) - 1;
-  const auto place = [&](const CloudPoint& p) {  // among the four children, as on the Z-curve
+  const auto place = [&](const CloudPoint& p) {  // number of its child, in the Z-curve's order
     const int i = std::min(static_cast<int>(p.x * scale), last_u),
               j = std::min(static_cast<int>(p.y * scale), last_v);
     return i % 2 + 2 * (j % 2);

@@ -12,7 +12,7 @@
 namespace semblance {
 namespace {
 
-// The point as it stands.
+// The whole point, before the detail of finer levels is taken off.
 Observation Observe(const FitPoint& point) {
   return {.uv = point.uv,
           .position = point.position,
@@ -20,7 +20,8 @@ Observation Observe(const FitPoint& point) {
           .landmark = point.role == PointRole::kLandmark};
 }
 
-// The detail that finer levels add at uv is taken off the point that the level aims at.
+// Takes the detail that finer levels add at uv off the point, if the level aims at the whole
+// surface.
 Observation WithoutFiner(Observation o, const HSplineSurface& surface, int level, FitAim aim) {
   if (aim == FitAim::kSurface && level < surface.shape().max_level) {
     o.position -= surface.Point(o.uv) - surface.LevelDerivative(level, o.uv);
@@ -28,7 +29,8 @@ Observation WithoutFiner(Observation o, const HSplineSurface& surface, int level
   return o;
 }
 
-// LevelView::likely of the points as they stand, those of a patch together.
+// LevelView::likely before the detail of finer levels is taken off; the points of a patch stand
+// together.
 std::vector<Observation> LikelyShape(const HSplineShape& shape,
                                      const std::vector<ShapePoint>& points) {
   double all = 0;
@@ -45,7 +47,8 @@ std::vector<Observation> LikelyShape(const HSplineShape& shape,
   return likely;
 }
 
-// If the point has a foot; what has been taken off the point is taken off the foot too.
+// Adds a bone observation if the point has a foot. The detail that was taken off the point is taken
+// off the foot too.
 void AddBone(const BoneAnchor& anchor, const Vec3& given, const Observation& o, LevelView& view) {
   if (anchor.foot.allFinite()) {
     view.bone.push_back({o, anchor.foot - (given - o.position), anchor.direction});
@@ -137,8 +140,8 @@ void AddElementRows(const SplineElement& element, std::shared_ptr<const Eigen::M
            element.dofs);
 }
 
-LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
-                      const FitTarget& target, int level, const ViewOptions& options) {
+LevelView MakeLevelView(const HSplineSurface& surface, const HSplineSurface& rest,
+                        const FitTarget& target, int level, const ViewOptions& options) {
   const HSplineShape& shape = surface.shape();
   if (level < 0 || level > shape.max_level || !(shape == rest.shape())) {
     throw InputError(fmt::format(
@@ -170,7 +173,7 @@ LevelView ViewOfLevel(const HSplineSurface& surface, const HSplineSurface& rest,
   return view;
 }
 
-// In place, cycle by cycle: a second copy of a million observations would be most of a fit's
+// Permutes in place, cycle by cycle: a copy of a million observations would take most of a fit's
 // memory.
 void SortObservations(const PointCloud& cloud, std::vector<Observation>& observations) {
   std::vector<bool> is_placed(observations.size(), false);
@@ -190,8 +193,8 @@ void SortObservations(const PointCloud& cloud, std::vector<Observation>& observa
   }
 }
 
-LevelView ViewOfSpace(const HierarchicalSplineSpace& space, const PointCloud& cloud,
-                      const FitTarget& target, const Vec2& lengths_mm) {
+LevelView MakeSpaceView(const HierarchicalSplineSpace& space, const PointCloud& cloud,
+                        const FitTarget& target, const Vec2& lengths_mm) {
   const auto elements = std::make_shared<const SplineElements>(space);
   LevelView view{.grid = {},
                  .start = space.Values(),

@@ -4,12 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "fitting/terms/strain.h"
-
 namespace semblance {
 
-MetricDistortion DistortionWhere(const HSplineSurface& surface, const HSplineSurface& rest,
-                                 const std::function<bool(const Vec3&)>& wanted) {
+MetricDistortion MeasureDistortion(const HSplineSurface& surface, const HSplineSurface& rest,
+                                   const std::function<bool(const Vec3&)>& wanted) {
   const HSplineShape& shape = rest.shape();
   const int columns = shape.PatchesU(shape.max_level), rows = shape.PatchesV(shape.max_level);
   double area = 0, strains = 0, areas = 0, largest = 0;
@@ -21,7 +19,7 @@ MetricDistortion DistortionWhere(const HSplineSurface& surface, const HSplineSur
       continue;
     }
     const SurfaceFrame to = surface.Frame(uv);
-    const Strain strain = StrainOf(*axes, to.du, to.dv);
+    const Strain strain = ComputeStrain(*axes, to.du, to.dv);
     area += axes->area;
     strains += axes->area * strain.SquaredNorm();
     areas += axes->area * strain.area * strain.area;

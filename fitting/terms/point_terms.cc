@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/terms/point_terms.h"
-
+#include <ceres/cost_function.h>
 #include <ceres/loss_function.h>
 
 #include <algorithm>
@@ -11,13 +10,12 @@
 
 #include "fitting/least_squares/linear_cost.h"
 #include "fitting/least_squares/qr_compression.h"
-#include "fitting/terms/robust_loss.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {
 namespace {
 
-// A loss looks at each point by itself, so robust points are not reduced.
+// A loss applies to each point separately, so points with a loss are not compressed.
 void AddByPoint(const PointTerm& term, const LevelView& view, ControlNet& net,
                 ceres::Problem& problem) {
   const double scale = term.weight / view.WeightSum();
@@ -30,13 +28,14 @@ void AddByPoint(const PointTerm& term, const LevelView& view, ControlNet& net,
   }
 }
 
-// Rows of one element are given on when another begins, or when they become many.
+// Collects the rows of one element and passes them on when another element begins or kMaxRows is
+// reached.
 class ElementBuffer {
  public:
   ElementBuffer(const LevelView& view, RowSink& sink) : view_(view), sink_(sink) {}
 
   void Add(const LocalStencil& stencil, const Vec3& position, double factor) {
-    if (stencil.element != element_ || rows_.size() == kMost) {
+    if (stencil.element != element_ || rows_.size() == kMaxRows) {
       Flush();
       element_ = stencil.element;
     }
@@ -61,7 +60,7 @@ class ElementBuffer {
 
  private:
   using Row = Eigen::Matrix<double, 19, 1>;
-  static constexpr std::size_t kMost = 65536;  // rows; 10 MB
+  static constexpr std::size_t kMaxRows = 65536;  // bounds memory: 10 MB
 
   const LevelView& view_;
   RowSink& sink_;
@@ -69,7 +68,7 @@ class ElementBuffer {
   std::vector<Row> rows_;
 };
 
-// The rows of those observations that are taken.
+// Adds the rows of the observations that `taken` accepts.
 template <class Taken>
 void AddWeighted(const LevelView& view, const std::vector<Observation>& observations, double scale,
                  const Taken& taken, RowSink& sink) {
@@ -145,6 +144,111 @@ double TermCost(const PriorShapeTerm& term, const LevelView& view, const Control
     sum += o.weight * (view.PointAt(o.uv, net) - o.position).squaredNorm();
   }
   return term.weight * sum;
+}
+
+namespace {
+
+// A misfit in mm, and its gradient with respect to the surface's point.
+struct Misfit {
+  double value = 0;
+  Vec3 slope = Vec3::Zero();
+};
+
+Misfit BoneMisfit(const NonPenetrationTerm& term, const BoneObservation& o, const Vec3& point) {
+  const double missing = term.min_depth_mm - o.direction.dot(point - o.foot);
+  return missing > 0 ? Misfit{missing, -o.direction} : Misfit{};
+}
+
+Misfit BoneMisfit(const SpringTerm&, const BoneObservation& o, const Vec3& point) {
+  const Vec3 way = point - o.foot;
+  const double length = way.norm();
+  return {length - (o.point.position - o.foot).norm(),
+          length > 0 ? Vec3(way / length) : o.direction};
+}
+
+double FootWeightSum(const LevelView& view) {
+  double sum = 0;
+  for (const BoneObservation& o : view.bone) {
+    sum += o.point.weight;
+  }
+  return sum;
+}
+
+// Residual factor * misfit of the surface's point at the observation's (u,v).
+template <class T>
+class BoneCost final : public ceres::CostFunction {
+ public:
+  BoneCost(const T& term, const BoneObservation& o, const DofStencil& stencil, double factor)
+      : term_(term), observation_(o), stencil_(stencil), factor_(factor) {
+    mutable_parameter_block_sizes()->assign(stencil.count, 3);
+    set_num_residuals(1);
+  }
+
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
+    Vec3 point = stencil_.fixed;
+    for (int k = 0; k < stencil_.count; ++k) {
+      point += stencil_.weight[k] * Eigen::Map<const Vec3>(parameters[k]);
+    }
+    const Misfit misfit = BoneMisfit(term_, observation_, point);
+    residuals[0] = factor_ * misfit.value;
+    for (int k = 0; jacobians != nullptr && k < stencil_.count; ++k) {
+      if (jacobians[k] != nullptr) {
+        Eigen::Map<Vec3>(jacobians[k], 3) = factor_ * stencil_.weight[k] * misfit.slope;
+      }
+    }
+    return true;
+  }
+
+ private:
+  T term_;
+  BoneObservation observation_;
+  DofStencil stencil_;
+  double factor_;
+};
+
+template <class T>
+void AddBone(const T& term, const LevelView& view, ControlNet& net, ceres::Problem& problem) {
+  const double scale = term.weight / FootWeightSum(view);
+  for (const BoneObservation& o : view.bone) {
+    const DofStencil stencil = view.StencilAt(o.point.uv);
+    std::vector<double*> blocks;
+    for (const int vertex : stencil.dofs()) {
+      blocks.push_back(net.vertices[vertex].data());
+    }
+    problem.AddResidualBlock(new BoneCost<T>(term, o, stencil, std::sqrt(scale * o.point.weight)),
+                             nullptr, blocks);
+  }
+}
+
+template <class T>
+double BoneSum(const T& term, const LevelView& view, const ControlNet& net) {
+  double sum = 0;
+  for (const BoneObservation& o : view.bone) {
+    const double misfit = BoneMisfit(term, o, view.PointAt(o.point.uv, net)).value;
+    sum += o.point.weight * misfit * misfit;
+  }
+  return sum > 0 ? term.weight * sum / FootWeightSum(view) : 0;
+}
+
+}  // namespace
+
+void AddResiduals(const NonPenetrationTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem) {
+  AddBone(term, view, net, problem);
+}
+
+void AddResiduals(const SpringTerm& term, const LevelView& view, ControlNet& net,
+                  ceres::Problem& problem) {
+  AddBone(term, view, net, problem);
+}
+
+double TermCost(const NonPenetrationTerm& term, const LevelView& view, const ControlNet& net) {
+  return BoneSum(term, view, net);
+}
+
+double TermCost(const SpringTerm& term, const LevelView& view, const ControlNet& net) {
+  return BoneSum(term, view, net);
 }
 
 }  // namespace semblance

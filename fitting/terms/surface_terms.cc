@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/terms/surface_terms.h"
-
 #include <ceres/cost_function.h>
 
 #include <Eigen/Eigenvalues>
@@ -12,7 +10,7 @@
 #include <vector>
 
 #include "fitting/least_squares/linear_cost.h"
-#include "fitting/terms/strain.h"
+#include "fitting/terms/metric_distortion.h"
 #include "fitting/terms/term_cost.h"
 
 namespace semblance {
@@ -22,11 +20,11 @@ const ControlNet& Anchor(const PriorTerm& term, const LevelView& view) {
   return term.towards == PriorTowards::kStart ? view.start : view.rest;
 }
 
-// Calls `look` with each vertex that the term holds.
-void ForEach(const PriorTerm& term, const LevelView& view, const auto& look) {
+// Calls `use` with each vertex that the term holds.
+void ForEach(const PriorTerm& term, const LevelView& view, const auto& use) {
   const std::size_t count = term.held_only ? view.held.size() : view.start.vertices.size();
   for (std::size_t k = 0; k < count; ++k) {
-    look(term.held_only ? view.held[k] : static_cast<int>(k));
+    use(term.held_only ? view.held[k] : static_cast<int>(k));
   }
 }
 
@@ -49,14 +47,14 @@ double TermCost(const PriorTerm& term, const LevelView& view, const ControlNet& 
 
 namespace {
 
-// The sixteen vertices at which the energy is zero: the template's, or nothing.
+// The sixteen vertices at which the energy is zero: the template's, or zeros.
 PatchMatrix Origin(SmoothnessOf of, const SplineElement& element) {
   return of == SmoothnessOf::kSurface ? PatchMatrix(PatchMatrix::Zero()) : element.rest;
 }
 
-// Calls `look` with each element and its stiffness, and with a root of that, which elements of one
+// Calls `use` with each element, its stiffness, and a root of the stiffness that elements of one
 // level share.
-void ForEachElement(const auto& term, const LevelView& view, const auto& look) {
+void ForEachElement(const auto& term, const LevelView& view, const auto& use) {
   std::shared_ptr<const Eigen::MatrixXd> root;
   ElementStiffness stiffness;
   int patches_u = -1;
@@ -64,10 +62,10 @@ void ForEachElement(const auto& term, const LevelView& view, const auto& look) {
     const SplineElement element = view.Element(e);
     if (element.patches_u != patches_u) {
       patches_u = element.patches_u;
-      stiffness = StiffnessOf(term, view.lengths_mm, patches_u, element.patches_v);
+      stiffness = PatchStiffness(term, view.lengths_mm, patches_u, element.patches_v);
       root = std::make_shared<const Eigen::MatrixXd>(StiffnessRoot(stiffness));
     }
-    look(element, stiffness, root);
+    use(element, stiffness, root);
   }
 }
 
@@ -92,17 +90,17 @@ double Energy(const auto& term, const LevelView& view, const ControlNet& net) {
 }  // namespace
 
 // weight * length^4 / area * energy of a patch.
-ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
-                             int patches_v) {
+ElementStiffness PatchStiffness(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
+                                int patches_v) {
   const double scale = term.weight * std::pow(term.length_mm, 4) / lengths_mm.prod();
-  return scale * ThinPlateStiffness(
-                     lengths_mm.x() / patches_u, lengths_mm.y() / patches_v,
-                     MetricOf({.stretch = term.stretch, .direction_deg = term.direction_deg}));
+  return scale * ThinPlateStiffness(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v,
+                                    MakeBendingMetric({.stretch = term.stretch,
+                                                       .direction_deg = term.direction_deg}));
 }
 
 // weight * length^2 / area * energy of a patch.
-ElementStiffness StiffnessOf(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
-                             int patches_v) {
+ElementStiffness PatchStiffness(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
+                                int patches_v) {
   const double scale = term.weight * std::pow(term.length_mm, 2) / lengths_mm.prod();
   return scale * MembraneStiffness(lengths_mm.x() / patches_u, lengths_mm.y() / patches_v);
 }
@@ -123,7 +121,7 @@ double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNe
   return Energy(term, view, net);
 }
 
-VertexId MirrorOf(const HSplineShape& shape, const VertexId& vertex) {
+VertexId MirrorVertex(const HSplineShape& shape, const VertexId& vertex) {
   const int columns = shape.Columns(vertex.level);
   const int mirrored =
       shape.ClosedU() ? (columns + 2 - vertex.i) % columns : columns - 1 - vertex.i;
@@ -132,10 +130,10 @@ VertexId MirrorOf(const HSplineShape& shape, const VertexId& vertex) {
 
 namespace {
 
-// A control vertex of an element, as a weighted sum of the unknowns.
+// A control vertex of an element as a weighted sum of the unknowns.
 struct Control {
-  int twin = -1;     // the index of its mirror
-  double share = 1;  // of the domain, relative
+  int twin = -1;     // index of its mirror
+  double share = 1;  // relative share of the domain
   Vec3 rest = Vec3::Zero(), fixed = Vec3::Zero();
   std::vector<int> dofs;
   Eigen::RowVectorXd weights;
@@ -149,7 +147,7 @@ struct Control {
   }
 };
 
-Control ControlOf(const SplineElement& element, int k) {
+Control MakeControl(const SplineElement& element, int k) {
   Control control{.share = std::pow(0.25, element.patch.level),
                   .rest = element.rest.row(k),
                   .fixed = element.fixed.row(k),
@@ -164,8 +162,8 @@ Control ControlOf(const SplineElement& element, int k) {
   return control;
 }
 
-// Each vertex of each patch's own level once.
-std::vector<Control> ControlsOf(const LevelView& view) {
+// Every vertex of every patch's own level, each once.
+std::vector<Control> MakeControls(const LevelView& view) {
   const HSplineShape shape = view.space != nullptr ? view.space->shape() : view.grid.Shape();
   std::map<VertexId, int> index;
   std::vector<Control> controls;
@@ -175,17 +173,17 @@ std::vector<Control> ControlsOf(const LevelView& view) {
     for (int k = 0; k < 16; ++k) {
       const VertexId vertex{p.level, shape.Column(p.level, p.i + k % 4), p.j + k / 4};
       if (index.try_emplace(vertex, static_cast<int>(controls.size())).second) {
-        controls.push_back(ControlOf(element, k));
+        controls.push_back(MakeControl(element, k));
       }
     }
   }
   for (const auto& [vertex, k] : index) {
-    controls[k].twin = index.at(MirrorOf(shape, vertex));
+    controls[k].twin = index.at(MirrorVertex(shape, vertex));
   }
   return controls;
 }
 
-double ShareOf(const std::vector<Control>& controls) {
+double ShareSum(const std::vector<Control>& controls) {
   double sum = 0;
   for (const Control& control : controls) {
     sum += control.share;
@@ -194,14 +192,15 @@ double ShareOf(const std::vector<Control>& controls) {
 }
 
 struct Mirror {
-  Vec3 point = Vec3::Zero();  // of the plane
+  Vec3 point = Vec3::Zero();  // on the plane
   Mat3 reflection = Mat3::Identity();
 };
 
-// The reflection that takes the template's vertices nearest to their mirrors: its normal n makes
-// n . sum_k x_k y_k^T n least, x and y being a vertex and its mirror from their common centre.
-Mirror MirrorOf(const std::vector<Control>& controls) {
-  const double all = ShareOf(controls);
+// The reflection that maps the template's vertices best to their mirrors. Its normal n minimises n
+// . sum_k x_k y_k^T n, where x_k and y_k are a vertex and its mirror, relative to the common
+// centre.
+Mirror FitMirror(const std::vector<Control>& controls) {
+  const double all = ShareSum(controls);
   Mirror mirror;
   for (const Control& control : controls) {
     mirror.point += control.share / all * control.rest;
@@ -218,19 +217,19 @@ Mirror MirrorOf(const std::vector<Control>& controls) {
   return mirror;
 }
 
-// Where a vertex's f is zero.
+// The place at which a vertex's f is zero.
 Vec3 Origin(const SymmetryTerm& term, const Mirror& mirror, const Control& control) {
   return term.of == SmoothnessOf::kDisplacement ? control.rest : mirror.point;
 }
 
 }  // namespace
 
-// Both vertices of a pair have the same misfit, so one stands for both.
+// Both vertices of a pair have the same misfit, so one residual counts for both.
 void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem) {
-  const std::vector<Control> controls = ControlsOf(view);
-  const Mirror mirror = MirrorOf(controls);
-  const double all = ShareOf(controls);
+  const std::vector<Control> controls = MakeControls(view);
+  const Mirror mirror = FitMirror(controls);
+  const double all = ShareSum(controls);
   for (int k = 0; k < static_cast<int>(controls.size()); ++k) {
     const Control &control = controls[k], &twin = controls[control.twin];
     if (control.twin < k) {
@@ -255,8 +254,8 @@ void AddResiduals(const SymmetryTerm& term, const LevelView& view, ControlNet& n
 }
 
 double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNet& net) {
-  const std::vector<Control> controls = ControlsOf(view);
-  const Mirror mirror = MirrorOf(controls);
+  const std::vector<Control> controls = MakeControls(view);
+  const Mirror mirror = FitMirror(controls);
   double sum = 0;
   for (const Control& control : controls) {
     const Control& twin = controls[control.twin];
@@ -264,16 +263,16 @@ double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNe
                g = twin.At(net) - Origin(term, mirror, twin);
     sum += control.share * (f - mirror.reflection * g).squaredNorm();
   }
-  return term.weight * sum / ShareOf(controls);
+  return term.weight * sum / ShareSum(controls);
 }
 
 namespace {
 
-// One of the 2 x 2 Gauss points of each patch where the template has tangents.
+// A Gauss point (2 x 2 per patch) at which the template has tangents.
 struct Sample {
   SplineElement element;
-  std::array<double, 16> x1{}, x2{};  // of the images of the template's axes, 1/mm
-  double area = kNaN;                 // of the template, relative
+  std::array<double, 16> x1{}, x2{};  // weights that give the images of the template's axes, 1/mm
+  double area = kNaN;                 // relative area of the template
 };
 
 using Weights = std::array<double, 16>;
@@ -302,7 +301,7 @@ void AddSamples(const LevelView& view, const SplineElement& element, std::vector
   }
 }
 
-std::vector<Sample> SamplesOf(const LevelView& view) {
+std::vector<Sample> MakeSamples(const LevelView& view) {
   std::vector<Sample> samples;
   for (int e = 0; e < view.elements(); ++e) {
     AddSamples(view, view.Element(e), samples);
@@ -310,14 +309,14 @@ std::vector<Sample> SamplesOf(const LevelView& view) {
   return samples;
 }
 
-// Weights of an element's vertices as weights of its dofs.
+// Turns weights of an element's vertices into weights of its dofs.
 Eigen::VectorXd OverDofs(const Weights& weights, const SplineElement& element) {
   const Eigen::Map<const Eigen::Matrix<double, 16, 1>> local(weights.data());
   return element.IsIdentity() ? Eigen::VectorXd(local)
                               : Eigen::VectorXd(element.extraction.transpose() * local);
 }
 
-double AreaOf(const std::vector<Sample>& samples) {
+double AreaSum(const std::vector<Sample>& samples) {
   double sum = 0;
   for (const Sample& sample : samples) {
     sum += sample.area;
@@ -325,7 +324,7 @@ double AreaOf(const std::vector<Sample>& samples) {
   return sum;
 }
 
-// factor (e11, e22, sqrt(2) e12), or factor (area / template's - 1).
+// Residual factor (e11, e22, sqrt(2) e12), or factor (area / template's area - 1).
 class DistortionCost final : public ceres::CostFunction {
  public:
   DistortionCost(const Sample& sample, DistortionOf of, double factor)
@@ -378,7 +377,7 @@ class DistortionCost final : public ceres::CostFunction {
     }
   }
 
-  Eigen::VectorXd x1_, x2_;  // by dof
+  Eigen::VectorXd x1_, x2_;  // weights per dof
   Vec3 fixed_x1_, fixed_x2_;
   DistortionOf of_;
   double factor_;
@@ -388,8 +387,8 @@ class DistortionCost final : public ceres::CostFunction {
 
 void AddResiduals(const DistortionTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem) {
-  const std::vector<Sample> samples = SamplesOf(view);
-  const double area = AreaOf(samples);
+  const std::vector<Sample> samples = MakeSamples(view);
+  const double area = AreaSum(samples);
   for (const Sample& sample : samples) {
     std::vector<double*> blocks;
     for (const int dof : sample.element.dofs) {
@@ -401,18 +400,18 @@ void AddResiduals(const DistortionTerm& term, const LevelView& view, ControlNet&
 }
 
 double TermCost(const DistortionTerm& term, const LevelView& view, const ControlNet& net) {
-  const std::vector<Sample> samples = SamplesOf(view);
+  const std::vector<Sample> samples = MakeSamples(view);
   double sum = 0;
   for (const Sample& sample : samples) {
     const TemplateAxes identity{.a1 = 1, .a2 = 0, .b2 = 1, .area = 1};
     const PatchMatrix vertices = sample.element.Vertices(net);
     const Strain strain =
-        StrainOf(identity, Applied(sample.x1, vertices), Applied(sample.x2, vertices));
+        ComputeStrain(identity, Applied(sample.x1, vertices), Applied(sample.x2, vertices));
     sum += sample.area *
            (term.of == DistortionOf::kMetric ? strain.SquaredNorm() : strain.area * strain.area);
   }
   const double scale = term.weight * term.length_mm * term.length_mm;
-  return samples.empty() ? 0 : scale * sum / AreaOf(samples);
+  return samples.empty() ? 0 : scale * sum / AreaSum(samples);
 }
 
 }  // namespace semblance

@@ -13,9 +13,12 @@
 namespace semblance {
 namespace {
 
+// Points of one element that are summed together. It bounds memory: 19 MB as rows of 48 columns.
+constexpr std::size_t kRunPoints = 16384;
+
 using ColumnPerPoint = Eigen::Matrix<double, 16, Eigen::Dynamic>;
 constexpr std::array<std::pair<int, int>, 6> kPairs = {
-    {{0, 0}, {1, 0}, {1, 1}, {2, 0}, {2, 1}, {2, 2}}};  // of coordinates
+    {{0, 0}, {1, 0}, {1, 1}, {2, 0}, {2, 1}, {2, 2}}};  // pairs of coordinates
 
 // weights * diag(factors) * weights^T, over the element's dofs.
 Eigen::MatrixXd GramOver(const SplineElement& element, const ColumnPerPoint& weights,
@@ -36,12 +39,11 @@ Vec3 NormalBefore(const LevelView& view, const Vec2& uv) {
 
 TangentSums::TangentSums(const TangentPointTerm& term, const LevelView& view)
     : view_(view), scale_(term.weight / view.WeightSum()), tangential_(term.tangential) {
-  constexpr std::size_t kMost = 16384;  // points of a run
   normals_.reserve(view.observations.size());
   for (const Observation& o : view.observations) {
     const int element = view.LocalAt(o.uv).element;
     if (runs_.empty() || runs_.back().element != element ||
-        runs_.back().end - runs_.back().begin == kMost) {
+        runs_.back().end - runs_.back().begin == kRunPoints) {
       runs_.push_back({element, normals_.size(), normals_.size()});
     }
     ++runs_.back().end;
@@ -59,11 +61,11 @@ Mat3 TangentSums::MetricAt(std::size_t observation) const {
 void TangentSums::ForEachElement(const UseSum& use) const {
   for (const Run& run : runs_) {
     const SplineElement element = view_.Element(run.element);
-    use(element.dofs, NormalOf(run, element));
+    use(element.dofs, RunNormalMatrix(run, element));
   }
 }
 
-Eigen::MatrixXd TangentSums::NormalOf(const Run& run, const SplineElement& element) const {
+Eigen::MatrixXd TangentSums::RunNormalMatrix(const Run& run, const SplineElement& element) const {
   const auto count = static_cast<Eigen::Index>(run.end - run.begin);
   ColumnPerPoint weights(16, count);
   Eigen::Matrix<double, Eigen::Dynamic, 6> factors(count, 6);
@@ -98,7 +100,7 @@ void TangentSums::ForEachDof(const std::function<void(std::span<const int> dofs)
 void TangentSums::AddDownhill(const ControlNet& net, Eigen::VectorXd& down) const {
   for (const Run& run : runs_) {
     const SplineElement element = view_.Element(run.element);
-    const PatchMatrix pull = PullOf(run, element.Vertices(net));
+    const PatchMatrix pull = RunDownhill(run, element.Vertices(net));
     const Eigen::MatrixXd over_dofs =
         element.IsIdentity() ? Eigen::MatrixXd(pull) : element.extraction.transpose() * pull;
     for (std::size_t d = 0; d < element.dofs.size(); ++d) {
@@ -107,7 +109,7 @@ void TangentSums::AddDownhill(const ControlNet& net, Eigen::VectorXd& down) cons
   }
 }
 
-PatchMatrix TangentSums::PullOf(const Run& run, const PatchMatrix& vertices) const {
+PatchMatrix TangentSums::RunDownhill(const Run& run, const PatchMatrix& vertices) const {
   PatchMatrix pull = PatchMatrix::Zero();
   for (std::size_t k = run.begin; k < run.end; ++k) {
     const Observation& o = view_.observations[k];
@@ -121,7 +123,8 @@ PatchMatrix TangentSums::PullOf(const Run& run, const PatchMatrix& vertices) con
 
 namespace {
 
-// Takes a misfit d to one whose square is (n . d)^2 + tangential |d - n (n . d)|^2.
+// The matrix that maps a misfit d to a vector of squared length (n . d)^2 + tangential |d - n (n .
+// d)|^2.
 Mat3 Shaping(const TangentPointTerm& term, const LevelView& view, const Vec2& uv) {
   const Vec3 n = NormalBefore(view, uv);
   if (n.isZero(0)) {
@@ -131,8 +134,8 @@ Mat3 Shaping(const TangentPointTerm& term, const LevelView& view, const Vec2& uv
   return along + std::sqrt(term.tangential) * (Mat3::Identity() - along);
 }
 
-// Rows over the coordinates of an element's vertices as rows over those of its dofs.
-Eigen::MatrixXd Extracted(const Eigen::MatrixXd& a, const SplineElement& element) {
+// Turns rows over the coordinates of an element's vertices into rows over those of its dofs.
+Eigen::MatrixXd OverDofs(const Eigen::MatrixXd& a, const SplineElement& element) {
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(a.rows(), 3 * element.extraction.cols());
   for (Eigen::Index dof = 0; dof < element.extraction.cols(); ++dof) {
     for (int v = 0; v < 16; ++v) {
@@ -142,7 +145,8 @@ Eigen::MatrixXd Extracted(const Eigen::MatrixXd& a, const SplineElement& element
   return result;
 }
 
-// Three rows per point, 48 columns.
+// Adds one residual block for the points of an element: three rows per point and 48 columns, then
+// compressed.
 void AddPatch(const TangentPointTerm& term, const LevelView& view,
               std::span<const Observation> points, double scale, ControlNet& net,
               ceres::Problem& problem) {
@@ -163,7 +167,7 @@ void AddPatch(const TangentPointTerm& term, const LevelView& view,
     }
   }
   const LinearRows rows = CompressRows(a, b);
-  AddCoupledResidual(element.IsIdentity() ? rows.a : Extracted(rows.a, element), rows.b.col(0),
+  AddCoupledResidual(element.IsIdentity() ? rows.a : OverDofs(rows.a, element), rows.b.col(0),
                      element.dofs, net, problem);
 }
 
@@ -171,12 +175,11 @@ void AddPatch(const TangentPointTerm& term, const LevelView& view,
 
 void AddResiduals(const TangentPointTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem) {
-  constexpr std::size_t kMost = 16384;  // points; 19 MB
   const double scale = term.weight / view.WeightSum();
   const std::span<const Observation> all(view.observations);
   const auto patch = [&](std::size_t k) { return view.LocalAt(all[k].uv).element; };
   for (std::size_t begin = 0, end = 0; begin < all.size(); begin = end) {
-    while (end < all.size() && end - begin < kMost && patch(end) == patch(begin)) {
+    while (end < all.size() && end - begin < kRunPoints && patch(end) == patch(begin)) {
       ++end;
     }
     AddPatch(term, view, all.subspan(begin, end - begin), scale, net, problem);

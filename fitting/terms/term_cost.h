@@ -1,25 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Each term twice: as rows or residuals to minimise, and as the plain sum that its documentation
-// states.
+// Every term in two forms: as rows or residuals that a solver minimises, and as the plain sum that
+// term.h documents. The law tests compare the two.
 #pragma once
 
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <span>
 #include <variant>
 
 #include "fitting/least_squares/linear_cost.h"
-#include "fitting/least_squares/row_sink.h"
+#include "fitting/least_squares/qr_compression.h"
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
 
 namespace semblance {
 
-// The rows of a term that is the same for x, y and z (PointTerm: without a loss); their sum of
-// squares equals TermCost.
+// Adds the rows of a term that treats x, y and z alike. The sum of their squares equals TermCost.
+// The rows of a PointTerm ignore its loss.
 void AddRows(const PointTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const LandmarkTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const PriorShapeTerm& term, const LevelView& view, RowSink& sink);
@@ -27,12 +28,12 @@ void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink);
 
-// Terms that are |A X - B|^2 with the same A for x, y and z; then AddRows gives its rows.
+// Terms of the form |A X - B|^2 with the same A for x, y and z.
 template <class T>
 concept RowTerm = requires(const T& term, const LevelView& view, RowSink& sink) {
   AddRows(term, view, sink);
 };
-// All rows of those terms that have any, and a weight.
+// Adds the rows of every RowTerm with a positive weight.
 inline void AddRows(std::span<const Term> terms, const LevelView& view, RowSink& sink) {
   for (const Term& term : terms) {
     std::visit(
@@ -53,14 +54,15 @@ bool IsSeparable(const T&) {
   return RowTerm<T>;
 }
 
-// Whether all terms with a weight add rows that treat x, y and z alike.
+// Returns whether every term with a positive weight is a RowTerm, so that x, y and z are separate
+// apart from a loss.
 inline bool SeparableButForLoss(std::span<const Term> terms) {
   return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
     return std::visit([]<class T>(const T& t) { return t.weight <= 0 || RowTerm<T>; }, term);
   });
 }
 
-// Terms whose residuals are linear in the vertices, whether or not they couple x, y and z.
+// Returns whether the residuals of a term are linear in the vertices. They may couple x, y and z.
 inline bool IsLinear(const TangentPointTerm&) { return true; }
 inline bool IsLinear(const SymmetryTerm&) { return true; }
 template <class T>
@@ -73,17 +75,19 @@ inline bool AllLinear(std::span<const Term> terms) {
   });
 }
 
-// What the term costs on one patch of a level of patches_u x patches_v, mm^2: x^T form x for each
-// coordinate x of the patch's sixteen f. lengths_mm: what [0,1] stands for along u and v.
-ElementStiffness StiffnessOf(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
-                             int patches_v);
-ElementStiffness StiffnessOf(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
-                             int patches_v);
+// The matrix of the term's cost on one patch of a level of patches_u x patches_v: the cost is x^T
+// matrix x, mm^2, for each coordinate x of the patch's sixteen f. lengths_mm: lengths of [0,1]
+// along u and v.
+ElementStiffness PatchStiffness(const SmoothnessTerm& term, const Vec2& lengths_mm, int patches_u,
+                                int patches_v);
+ElementStiffness PatchStiffness(const MembraneTerm& term, const Vec2& lengths_mm, int patches_u,
+                                int patches_v);
 
 // Adds the residuals of a term over `net`, whose vertices become parameter blocks of 3 doubles. The
-// sum of their squares (robust: of their losses), which is twice Ceres' cost, equals TermCost but
-// for a constant: the points of a patch are reduced to at most 16 rows (qr_compression.h), without
-// what no net can change. Points are reduced best in the order of SortObservations.
+// sum of their squares (of their losses for a robust term) is twice Ceres' cost. It equals TermCost
+// up to a constant, because the points of a patch are reduced to at most 16 rows
+// (qr_compression.h), which drops the misfit that no net can change. The order of SortObservations
+// gives the fewest rows.
 void AddResiduals(const PointTerm& term, const LevelView& view, ControlNet& net,
                   ceres::Problem& problem);
 void AddResiduals(const TangentPointTerm& term, const LevelView& view, ControlNet& net,
@@ -102,7 +106,7 @@ void AddResiduals(const T& term, const LevelView& view, ControlNet& net, ceres::
   AddRows(term, view, sink);
 }
 
-// Of all terms that have a weight.
+// Adds the residuals of every term with a positive weight.
 inline void AddResiduals(std::span<const Term> terms, const LevelView& view, ControlNet& net,
                          ceres::Problem& problem) {
   for (const Term& term : terms) {
@@ -112,10 +116,42 @@ inline void AddResiduals(std::span<const Term> terms, const LevelView& view, Con
   }
 }
 
-// scale * rho of a squared distance in mm^2, for a term with a loss.
+// rho(s) of a squared distance s, mm^2, by the formulas of PointTerm, which are those of Ceres.
+inline double Rho(const PointTerm& term, double s) {
+  const double a = term.loss_width_mm;
+  switch (term.loss) {
+    case RobustLoss::kHuber:
+      return s <= a * a ? s : 2 * a * std::sqrt(s) - a * a;
+    case RobustLoss::kCauchy:
+      return a * a * std::log1p(s / (a * a));
+    case RobustLoss::kTukey:
+      return a * a / 3 * (1 - std::pow(std::max(1 - s / (a * a), 0.0), 3));
+    case RobustLoss::kNone:
+      break;
+  }
+  return s;
+}
+
+// rho'(s), which is 1 at 0: the factor of a point's weight in iteratively reweighted least squares.
+inline double RhoSlope(const PointTerm& term, double s) {
+  const double a = term.loss_width_mm;
+  switch (term.loss) {
+    case RobustLoss::kHuber:
+      return s <= a * a ? 1 : a / std::sqrt(s);
+    case RobustLoss::kCauchy:
+      return 1 / (1 + s / (a * a));
+    case RobustLoss::kTukey:
+      return std::pow(std::max(1 - s / (a * a), 0.0), 2);
+    case RobustLoss::kNone:
+      break;
+  }
+  return 1;
+}
+
+// Ceres' loss scale * rho for a term with a loss.
 std::unique_ptr<ceres::LossFunction> MakeLoss(const PointTerm& term, double scale);
 
-// The cost of a term as term.h states it, mm^2.
+// The cost of a term by its formula in term.h, mm^2.
 double TermCost(const PointTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const LandmarkTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const PriorShapeTerm& term, const LevelView& view, const ControlNet& net);

@@ -21,7 +21,7 @@
 namespace semblance {
 namespace {
 
-constexpr Eigen::Index kAtOnce = 64;  // right-hand sides, to bound the memory
+constexpr Eigen::Index kAtOnce = 64;  // right-hand sides per solve; bounds the memory
 
 bool IsOfPoints(const Term& term) {
   return std::holds_alternative<PointTerm>(term) || std::holds_alternative<LandmarkTerm>(term) ||
@@ -30,7 +30,7 @@ bool IsOfPoints(const Term& term) {
 
 bool TreatsAxesAlike(const Term& term) { return SeparableButForLoss(std::span(&term, 1)); }
 
-// The terms with a weight that are not of the points.
+// The terms with a positive weight that are not terms of the points.
 std::vector<Term> OthersAmong(std::span<const Term> terms) {
   std::vector<Term> others;
   std::copy_if(terms.begin(), terms.end(), std::back_inserter(others),
@@ -48,7 +48,8 @@ std::vector<std::string_view> LeftOut(std::span<const Term> terms) {
   return names;
 }
 
-// Those that are solved for: tangent_points as points, and nothing of what couples x, y and z.
+// The terms that are solved for: tangent_points become points, and other terms that couple x, y and
+// z are left out.
 std::vector<Term> Solved(std::span<const Term> terms) {
   std::vector<Term> solved;
   for (const Term& term : terms) {
@@ -82,10 +83,10 @@ Eigen::MatrixXd UnitColumns(Eigen::Index rows, Eigen::Index first, Eigen::Index 
   return unit;
 }
 
-// The points less what levels finer than `level` add.
+// The points without the detail of levels finer than `level`.
 FitTarget LessFiner(const HSplineSurface& surface, const HSplineSurface& rest,
                     const FitTarget& target, int level) {
-  const LevelView view = ViewOfLevel(surface, rest, target, level);
+  const LevelView view = MakeLevelView(surface, rest, target, level);
   FitTarget moved = target;
   moved.anchors.clear();
   for (std::size_t k = 0; k < moved.points.size(); ++k) {
@@ -108,15 +109,15 @@ HSplineSurface UpTo(int level, const HSplineSurface& surface) {
   return coarse;
 }
 
-// Whether the level was fitted with finer vertices only in places.
+// Returns whether only some of the level's vertices are edited.
 bool IsFinerSomewhere(const HSplineSurface& surface, int level) {
   const std::size_t edited = surface.Offsets(level).size(),
                     all = static_cast<std::size_t>(surface.Columns(level)) * surface.Rows(level);
   return level > 0 && edited > 0 && edited < all;
 }
 
-// Sum of A^T z over the rows, z random of unit variance: its covariance is that of the rows' normal
-// matrix (perturb and solve; Papandreou & Yuille 2010).
+// Sums A^T z over the rows with random z of unit variance. The covariance of the sum is the rows'
+// normal matrix (perturb and solve; Papandreou & Yuille 2010).
 class NoiseSink final : public RowSink {
  public:
   NoiseSink(Eigen::Index vertices, Random& random)
@@ -156,18 +157,18 @@ struct PointRow {
 struct ErrorPropagation::Model {
   HSplineSurface surface;
   int level;
-  FitTarget target;  // for all levels up to `level`
+  FitTarget target;  // without the detail of finer levels
   bool in_places;
   std::vector<Term> given;
   std::unique_ptr<SpaceSolve> solve;
-  std::vector<PointRow> rows = {};             // of the points, in the order given
-  std::vector<double> weights = {};            // of the points, in the cost
-  std::vector<Term> others = {};               // of the terms, those that make P
+  std::vector<PointRow> rows = {};             // one per point, in the given order
+  std::vector<double> weights = {};            // W, one per point
+  std::vector<Term> others = {};               // the terms of P
   SparseMatrix others_normal = {};             // P, lower
   SparseMatrix normal = {};                    // M, lower
-  std::unique_ptr<SparseFactor> factor = {};   // of M
-  std::array<Eigen::MatrixXd, 3> points = {};  // M^-1 A'W root of each coordinate, transposed
-  Eigen::MatrixXd undone = {};                 // unknowns x 3, mm
+  std::unique_ptr<SparseFactor> factor = {};   // factor of M
+  std::array<Eigen::MatrixXd, 3> points = {};  // M^-1 A'W root per coordinate, transposed
+  Eigen::MatrixXd undone = {};                 // steps not taken: unknowns x 3, mm
   double determined = kNaN;
   double prior_sd = 0;
 
@@ -181,13 +182,13 @@ struct ErrorPropagation::Model {
     const std::vector<Term> solved = Solved(terms);
     if (in_places) {
       const HSplineSurface coarse = UpTo(level, fitted), coarse_rest = UpTo(level, rest);
-      solve = std::make_unique<SpaceSolve>(SpaceProblem{.start = coarse,
-                                                        .rest = coarse_rest,
-                                                        .target = target,
-                                                        .terms = solved,
-                                                        .settled = true});
+      solve = std::make_unique<AdaptiveSolve>(SpaceProblem{.start = coarse,
+                                                           .rest = coarse_rest,
+                                                           .target = target,
+                                                           .terms = solved,
+                                                           .final_loss_width = true});
     } else {
-      solve = std::make_unique<SpaceSolve>(ViewOfLevel(fitted, rest, points_given, level), solved,
+      solve = std::make_unique<LevelSolve>(MakeLevelView(fitted, rest, points_given, level), solved,
                                            Solver::kFastest);
     }
     weights = solve->PointWeights();
@@ -237,7 +238,7 @@ struct ErrorPropagation::Model {
     return pull;
   }
 
-  // trace(M^-1 A'WA), some points at a time.
+  // trace(M^-1 A'WA), for kAtOnce points at a time.
   double Determined() const {
     const auto count = static_cast<Eigen::Index>(weights.size());
     double trace = 0;
@@ -255,7 +256,7 @@ struct ErrorPropagation::Model {
     return trace;
   }
 
-  // Of the points' errors and of what is undone, along the normal.
+  // The variance along the normal from the points' errors and the steps not taken.
   double VarianceOfPoints(const PointRow& row, const Vec3& normal_there) const {
     Eigen::VectorXd along = Eigen::VectorXd::Zero(points[0].rows());
     double left = 0;
@@ -268,7 +269,7 @@ struct ErrorPropagation::Model {
     return along.squaredNorm() + left * left;
   }
 
-  // s' M^-1 P M^-1 s of each row, a slab of columns of the matrix at a time.
+  // s' M^-1 P M^-1 s for each row s, for kAtOnce columns of the matrix at a time.
   std::vector<double> VarianceOfOthers(const std::vector<PointRow>& at) const {
     std::vector<std::vector<std::pair<int, int>>> uses(normal.rows());  // row, its entry
     for (std::size_t k = 0; k < at.size(); ++k) {
@@ -295,7 +296,7 @@ struct ErrorPropagation::Model {
     return variances;
   }
 
-  // Whether some term says something of each unknown that makes a point.
+  // Returns whether some term determines each unknown of a point.
   bool IsKnown(const PointRow& row, const Eigen::VectorXd& diagonal) const {
     const double least = 1e-12 * diagonal.maxCoeff();
     for (std::size_t v = 0; v < row.index.size(); ++v) {
@@ -367,5 +368,22 @@ std::vector<HSplineSurface> ErrorPropagation::Samples(int count, std::uint64_t r
 double ErrorPropagation::prior_sd() const { return model_->prior_sd; }
 double ErrorPropagation::determined() const { return model_->determined; }
 std::vector<std::string_view> ErrorPropagation::left_out() const { return LeftOut(model_->given); }
+
+Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd left, double share) {
+  const Eigen::Index n = left.rows();
+  Eigen::MatrixXd root(n, n);
+  Eigen::Index rank = 0;
+  const double enough = n > 0 ? share * left.diagonal().maxCoeff() : 0;
+  for (; rank < n; ++rank) {
+    Eigen::Index pivot = 0;
+    const double largest = left.diagonal().maxCoeff(&pivot);
+    if (!(largest > enough)) {
+      break;
+    }
+    root.col(rank) = left.col(pivot) / std::sqrt(largest);
+    left.noalias() -= root.col(rank) * root.col(rank).transpose();
+  }
+  return root.leftCols(rank);
+}
 
 }  // namespace semblance

@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/pipeline/uncertainty.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
 #include "fitting/uncertainty/error_propagation.h"
-#include "fitting/uncertainty/pivoted_root.h"
 #include "interp/evaluation/calibration.h"
 #include "interp/kriging/kriging_process.h"
 #include "problems/conditional/condition_depths.h"
+#include "problems/pipeline/uncertainty.h"
 #include "problems/prior/depth_spread.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/quantile.h"

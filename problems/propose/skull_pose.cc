@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/propose/skull_pose.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Cholesky>
@@ -12,7 +10,8 @@
 #include <numbers>
 #include <numeric>
 
-#include "fitting/shape_model/shape_parameters.h"
+#include "fitting/shape_model/shape_model.h"
+#include "problems/propose/skull_pose.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/vertex_clusters.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
-#include "fitting/solve/level_fit.h"
+#include "fitting/solve/space_solve.h"
 #include "fitting/space/point_cloud.h"
 #include "fitting/terms/level_view.h"
 #include "surfaces/base/random.h"

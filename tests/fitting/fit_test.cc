@@ -132,8 +132,8 @@ TEST(Fit, ChangesTheLevelsOfTheScheduleAndNoOther) {
   }
 }
 
-// Thesis 4.4, by what a fit does: each step goes its part of the way that the level's whole solve
-// would go from where the steps before have left the surface.
+// The schedule of thesis 4.4: each step goes its fraction of the way of the level's solve, from the
+// surface that the previous steps have left.
 TEST(Fit, TheScheduleByDefaultIsThePublishedOne) {
   const std::vector<ScheduleStep> published = {{0, 0.4},  {1, 0.35}, {2, 0.35},
                                                {0, 0.35}, {1, 0.3},  {2, 0.3}};
@@ -180,8 +180,8 @@ TEST(Fit, EveryStepComesNearer) {
   EXPECT_DOUBLE_EQ(result.levels.back().rms_after_mm, result.point_rms_mm);
 }
 
-// The terms by default allow both ways; they minimise the same sum.
-TEST(Fit, TheSolverIsTheOneAskedForAndChangesNoSurface) {
+// The default terms allow both solvers, which minimise the same sum.
+TEST(Fit, TheSolverIsTheRequestedOneAndDoesNotChangeTheSurface) {
   const HSplineSurface start = RandomSurface(Shape(), 2);
   const FitTarget target = TargetOn(RandomSurface(Shape(), 1), 400);
   const FitResult ceres = Fit(start, target, {}, {.solver = Solver::kCeres}, {});
@@ -195,7 +195,7 @@ TEST(Fit, TheSolverIsTheOneAskedForAndChangesNoSurface) {
   }
 }
 
-// Whatever detail finer levels hold, a template that meets its target is left in peace.
+// A template that meets its target does not move, whatever detail its finer levels have.
 TEST(Fit, ATemplateThatFitsStays) {
   const HSplineSurface start = RandomSurface(Shape(), 3, 60);
   const FitTarget target = TargetOn(start, 300);
@@ -226,7 +226,7 @@ TEST(Fit, FeaturesGetTheirOffsetsBack) {
   for (const auto& [vertex, offset] : start.Offsets()) {
     features.push_back(vertex);
   }
-  features.push_back({2, 7, 9});  // without an offset in the template: has none afterwards
+  features.push_back({2, 7, 9});  // has no offset in the template, and none afterwards
   ASSERT_FALSE(start.Offset({2, 7, 9}).has_value());
   const FitResult restored = Fit(start, target, features, {}, {});
   EXPECT_EQ(restored.restored_features, static_cast<int>(features.size()));
@@ -267,7 +267,7 @@ TEST(Fit, FrozenFeaturesKeepTheirOffsetsAndWeightedOnesResist) {
   EXPECT_EQ(moved(WeightedFeatures{.weight = 0}), free);
   EXPECT_LT(some, 0.9 * free);
   EXPECT_LT(few, 0.5 * some);
-  // What is frozen is made up for by its neighbours; what is given back afterwards is not.
+  // Neighbours compensate for frozen features, but not for features that are restored afterwards.
   const FitResult restored = Fit(start, target, features, {}, {});
   EXPECT_LT(frozen.point_rms_mm, restored.point_rms_mm);
 }
@@ -284,7 +284,7 @@ TEST(Fit, OrderOfPointsChangesNoByte) {
   EXPECT_EQ(a.residual_mm.front(), b.residual_mm.back());
 }
 
-// A template 150 mm off with few points: no step tears it; it arrives with its shape.
+// A template that starts 150 mm away arrives with its shape, although there are few points.
 TEST(Fit, AFarTemplateStaysInShape) {
   const HSplineSurface start = RandomSurface(Shape(), 2);
   const Vec3 shift(-120, 90, 0);
@@ -351,7 +351,7 @@ TEST(Fit, BackFittingSweepsComeNearer) {
             Fit(start, target, {}, without, {}).point_rms_mm);
 }
 
-// The same displacement costs the same at each level, in all domains.
+// The same displacement costs the same at every level and for every domain.
 TEST(Fit, SmoothnessMeansTheSameAtEveryLevel) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     const HSplineSurface rest = SmoothSurface(Shape(closure), 2),

@@ -281,8 +281,8 @@ double SpringRms_mm(const RunResult& result) {
 }
 
 double Strain(const RunResult& result) {
-  return DistortionWhere(result.fit.surface, result.placed.surface,
-                         [](const Vec3&) { return true; })
+  return MeasureDistortion(result.fit.surface, result.placed.surface,
+                           [](const Vec3&) { return true; })
       .rms_strain;
 }
 

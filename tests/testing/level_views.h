@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "fitting/solve/level_fit.h"
+#include "fitting/solve/space_solve.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"

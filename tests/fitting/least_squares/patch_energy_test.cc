@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/least_squares/patch_energy.h"
-
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <Eigen/Eigenvalues>
+#include <cmath>
+#include <numbers>
+#include <vector>
 
+#include "fitting/least_squares/patch_energy.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"
@@ -37,7 +40,7 @@ ControlNet RandomNet(int m, int n, std::uint64_t random_seed) {
   return net;
 }
 
-// Integral over [0,1]^2 of |d^(k+l) S / du^k dv^l|^2.
+// The integral over [0,1]^2 of |d^(k+l) S / du^k dv^l|^2.
 double Integral(const ControlNet& net, int m, int n, int k, int l) {
   const Quadrature q = GaussLegendre(8);
   double sum = 0;
@@ -74,12 +77,13 @@ TEST(PatchEnergy, FormsEqualQuadratureOfTheDerivatives) {
   EXPECT_NEAR(lengths.y(), std::sqrt(Integral(net, m, n, 0, 1)), 1e-11 * lengths.y());
 }
 
-// Of tr((M H)^2) from the definition, and of a patch whose sides are stretched instead.
-TEST(PatchEnergy, BendingInOtherLengthsIsThatOfItsMetric) {
+// Compares the integral of tr((M H)^2) with its definition, and with the energy of a patch whose
+// sides are stretched instead.
+TEST(PatchEnergy, BendingInAMetricEqualsItsDefinition) {
   const int m = 3, n = 4;
   const double lu = 7, lv = 5;
   const ControlNet net = RandomNet(m, n, 3);
-  const BendingMetric metric = MetricOf({.stretch = 2.5, .direction_deg = 35});
+  const BendingMetric metric = MakeBendingMetric({.stretch = 2.5, .direction_deg = 35});
   const Quadrature q = GaussLegendre(8);
   double expected = 0;
   for (int k = 0; k < 64 * m * n; ++k) {
@@ -101,7 +105,7 @@ TEST(PatchEnergy, BendingInOtherLengthsIsThatOfItsMetric) {
   EXPECT_NEAR(StiffnessEnergy(ThinPlateStiffness(lu / m, lv / n, metric), grid, net), expected,
               1e-11 * expected);
   const ElementStiffness along_t =
-      ThinPlateStiffness(2, 3, MetricOf({.stretch = 4, .direction_deg = 90}));
+      ThinPlateStiffness(2, 3, MakeBendingMetric({.stretch = 4, .direction_deg = 90}));
   EXPECT_LT((along_t - ThinPlateStiffness(2 * 2, 3 / 2.0)).cwiseAbs().maxCoeff(),
             1e-12 * along_t.maxCoeff());
 }
@@ -116,7 +120,7 @@ TEST(PatchEnergy, RootsReproduceTheFormsAndShowTheirNullSpaces) {
 }
 
 // Shifting the vertices by one along a closed direction changes nothing.
-TEST(PatchEnergy, PeriodicEnergyKnowsNoSeam) {
+TEST(PatchEnergy, PeriodicEnergyHasNoSeam) {
   const PatchGrid grid{.patches_u = 6, .patches_v = 5, .periodic_u = true};
   Random random(2);
   ControlNet net{.columns = grid.Columns(), .rows = grid.Rows(), .vertices = {}};
@@ -134,6 +138,96 @@ TEST(PatchEnergy, PeriodicEnergyKnowsNoSeam) {
     EXPECT_GT(energy, 0);
     EXPECT_NEAR(StiffnessEnergy(form, grid, shifted), energy, 1e-12 * energy);
   }
+}
+
+using Eigen::Matrix2d;
+
+// Random second derivatives, which bend `more` times as much across a direction as along it.
+std::vector<Matrix2d> Hessians(double direction_deg, double more, std::uint64_t seed) {
+  Random random(seed);
+  const double turn = direction_deg * std::numbers::pi / 180;
+  const Matrix2d axes = Eigen::Rotation2Dd(turn).toRotationMatrix();
+  std::vector<Matrix2d> all;
+  for (int k = 0; k < 500; ++k) {
+    const double along = random.Normal(), mixed = random.Normal(), across = random.Normal();
+    Matrix2d h;
+    h << along, mixed * more, mixed * more, across * more * more;
+    all.emplace_back(axes * h * axes.transpose());
+  }
+  return all;
+}
+
+BendingSums SumsOf(const std::vector<Matrix2d>& hessians) {
+  BendingSums sums{};
+  for (const Matrix2d& h : hessians) {
+    const double ss = h(0, 0), st = h(0, 1), tt = h(1, 1);
+    const BendingSums here = {ss * ss, st * st, tt * tt, ss * st, st * tt, ss * tt};
+    for (std::size_t k = 0; k < sums.size(); ++k) {
+      sums[k] += here[k];
+    }
+  }
+  return sums;
+}
+
+TEST(BendingMetric, HasItsStretchAndDirection) {
+  for (const double stretch : {1.5, 4.0, 20.0}) {
+    for (const double direction_deg : {0.0, 10.0, 90.0, 135.0, 179.0}) {
+      const BendingMetric metric =
+          MakeBendingMetric({.stretch = stretch, .direction_deg = direction_deg});
+      EXPECT_NEAR(metric.determinant(), 1, 1e-12);
+      const BendingStretch found = FindStretch(metric);
+      EXPECT_NEAR(found.stretch, stretch, 1e-9);
+      const double apart = std::abs(found.direction_deg - direction_deg);
+      EXPECT_LT(std::min(apart, 180 - apart), 1e-6) << "0 and 180 degrees are one direction";
+      EXPECT_NEAR(StretchBetween(BendingMetric::Identity(), metric), stretch, 1e-6 * stretch);
+      EXPECT_NEAR(StretchBetween(metric, metric), 1, 1e-5);
+    }
+  }
+  EXPECT_EQ(MakeBendingMetric({}), BendingMetric::Identity());
+  EXPECT_EQ(FindStretch(BendingMetric::Identity()).stretch, 1);
+}
+
+TEST(BendingMetric, CountsBendingAsDefined) {
+  const std::vector<Matrix2d> hessians = Hessians(20, 2, 1);
+  const BendingMetric metric = MakeBendingMetric({.stretch = 3, .direction_deg = 70});
+  double bending = 0;
+  for (const Matrix2d& h : hessians) {
+    bending += (metric * h * metric * h).trace();
+  }
+  EXPECT_NEAR(BendingIn(metric, SumsOf(hessians)), bending, 1e-10 * bending);
+}
+
+TEST(BendingMetric, NoOtherMetricBendsLess) {
+  for (const double direction_deg : {0.0, 30.0, 90.0, 160.0}) {
+    const BendingSums sums = SumsOf(Hessians(direction_deg, 3, 2));
+    const BendingMetric found = MetricOfLeastBending(sums, 100);
+    const double least = BendingIn(found, sums);
+    for (double stretch = 1; stretch < 20; stretch *= 1.1) {
+      for (int turn_deg = 0; turn_deg < 180; turn_deg += 5) {
+        const BendingMetric other =
+            MakeBendingMetric({.stretch = stretch, .direction_deg = static_cast<double>(turn_deg)});
+        EXPECT_GE(BendingIn(other, sums), (1 - 1e-9) * least);
+      }
+    }
+    const BendingStretch stretch = FindStretch(found);
+    EXPECT_NEAR(stretch.stretch, 3, 0.3);
+    EXPECT_NEAR(std::cos((stretch.direction_deg - direction_deg) * std::numbers::pi / 90), 1, 0.01);
+    EXPECT_NEAR(FindStretch(MetricOfLeastBending(sums, 2)).stretch, 2, 1e-9);
+  }
+}
+
+TEST(BendingMetric, OfAPlaneIsTheIdentity) {
+  EXPECT_EQ(MetricOfLeastBending({}, 100), BendingMetric::Identity());
+}
+
+TEST(BendingMetric, MetricBeyondContinuesByTheSameStretch) {
+  const BendingMetric one = MakeBendingMetric({.stretch = 2, .direction_deg = 30}),
+                      beyond = MetricBeyond(BendingMetric::Identity(), one, 100);
+  EXPECT_NEAR(FindStretch(beyond).stretch, 4, 1e-9);
+  EXPECT_NEAR(FindStretch(beyond).direction_deg, 30, 1e-6);
+  EXPECT_NEAR(FindStretch(MetricBeyond(BendingMetric::Identity(), one, 3)).stretch, 3, 1e-9);
+  const BendingMetric other = MakeBendingMetric({.stretch = 5, .direction_deg = 100});
+  EXPECT_NEAR(StretchBetween(one, MetricBeyond(other, one, 1e6)), StretchBetween(other, one), 1e-4);
 }
 
 }  // namespace

@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/least_squares/sparse_factor.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <stdexcept>
 #include <vector>
 
-#include "fitting/least_squares/triangle_sum.h"
+#include "fitting/least_squares/sparse_factor.h"
 #include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
 
-// Rows of four numbers each, beside each other in the columns, as of points on a curve.
+// Rows of four consecutive entries each, like those of points on a curve.
 Eigen::MatrixXd Rows(int rows, int columns, std::uint64_t random_seed) {
   Random random(random_seed);
   Eigen::MatrixXd a = Eigen::MatrixXd::Zero(rows, columns);
@@ -28,13 +27,13 @@ Eigen::MatrixXd Rows(int rows, int columns, std::uint64_t random_seed) {
   return a;
 }
 
-SparseMatrix LowerOf(const Eigen::MatrixXd& a) {
+SparseMatrix LowerTriangle(const Eigen::MatrixXd& a) {
   const Eigen::MatrixXd normal = a.transpose() * a;
   return Eigen::MatrixXd(normal.triangularView<Eigen::Lower>()).sparseView();
 }
 
-// Few rows, many, some twice, and columns of no row; each of its own size.
-TEST(NumericalRank, IsThatOfTheSingularValues) {
+// Few rows, many rows, repeated rows and columns without rows, with columns of different sizes.
+TEST(NumericalRank, EqualsThatOfTheSingularValues) {
   for (std::uint64_t k = 0; k < 60; ++k) {
     const int columns = 10 + static_cast<int>(k), rows = 3 + 2 * static_cast<int>(k % 37);
     Eigen::MatrixXd a = Rows(rows, columns, k);
@@ -46,11 +45,11 @@ TEST(NumericalRank, IsThatOfTheSingularValues) {
                              a * a.colwise().norm().cwiseMax(1e-300).cwiseInverse().asDiagonal())
                              .setThreshold(1e-5)
                              .rank());
-    EXPECT_EQ(NumericalRank(LowerOf(a), rows), expected) << k;
+    EXPECT_EQ(NumericalRank(LowerTriangle(a), rows), expected) << k;
   }
 }
 
-// The Laplacian of a square grid, a little stiffened: its factor has wide dense blocks.
+// The Laplacian of a square grid with a small shift. Its factor has wide dense blocks.
 SparseMatrix GridLaplacian(int side) {
   std::vector<Eigen::Triplet<double>> entries;
   for (int k = 0; k < side * side; ++k) {
@@ -117,7 +116,7 @@ TEST(BlockTriangleSum, IsTheSumOfItsBlocks) {
   EXPECT_EQ(taken.nonZeros(), 9 + 9 + 6);
 }
 
-TEST(SparseFactor, IsTheSameByVertex) {
+TEST(SparseFactor, OrderByVertexGivesTheSameSolution) {
   const SparseMatrix lower = RingOfVertices(40);
   const Eigen::VectorXd right = Eigen::VectorXd::LinSpaced(lower.rows(), -1, 2);
   const SparseFactor plain(lower, 1e-3), by_vertex(lower, 1e-3, RowKind::kCoordinate);
@@ -128,6 +127,62 @@ TEST(SparseFactor, IsTheSameByVertex) {
 }
 
 TEST(NumericalRank, OfNothingIsZero) { EXPECT_EQ(NumericalRank(SparseMatrix(7, 7), 5), 0); }
+
+// The Laplacian of a grid with some additional random pairs.
+Eigen::SparseMatrix<double> RandomLaplacian(int side, std::uint64_t seed) {
+  Random random(seed);
+  const int count = side * side;
+  Eigen::MatrixXd all = Eigen::MatrixXd::Zero(count, count);
+  const auto couple = [&](int a, int b, double weight) {
+    all(a, a) += weight;
+    all(b, b) += weight;
+    all(a, b) -= weight;
+    all(b, a) -= weight;
+  };
+  for (int k = 0; k < count; ++k) {
+    all(k, k) += 0.01;
+    if (k % side + 1 < side) {
+      couple(k, k + 1, random.Uniform(0.5, 2));
+    }
+    if (k + side < count) {
+      couple(k, k + side, random.Uniform(0.5, 2));
+    }
+    if (const auto other = static_cast<int>(random.Index(count)); k % 5 == 0 && other != k) {
+      couple(k, other, 1);
+    }
+  }
+  return Eigen::MatrixXd(all.triangularView<Eigen::Lower>()).sparseView();
+}
+
+TEST(SelectedInverse, IsTheInverseWhereTheMatrixHasEntries) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    const Eigen::SparseMatrix<double> lower = RandomLaplacian(7, seed);
+    const Eigen::MatrixXd whole =
+        (Eigen::MatrixXd(lower) +
+         Eigen::MatrixXd(Eigen::MatrixXd(lower).triangularView<Eigen::StrictlyLower>()).transpose())
+            .inverse();
+    const SelectedInverse inverse(lower);
+    ASSERT_TRUE(inverse.usable());
+    for (int k = 0; k < lower.outerSize(); ++k) {
+      for (Eigen::SparseMatrix<double>::InnerIterator entry(lower, k); entry; ++entry) {
+        const auto row = static_cast<int>(entry.row());
+        EXPECT_NEAR(inverse.At(row, k), whole(row, k), 1e-10 * whole(k, k));
+        EXPECT_EQ(inverse.At(k, row), inverse.At(row, k));
+      }
+    }
+  }
+}
+
+TEST(SelectedInverse, OtherEntriesAreRefused) {
+  Eigen::SparseMatrix<double> lower(2, 2);
+  lower.insert(0, 0) = 1;
+  lower.insert(1, 1) = -1;
+  EXPECT_FALSE(SelectedInverse(lower).usable());
+  lower.coeffRef(1, 1) = 1;
+  const SelectedInverse inverse(lower);
+  EXPECT_EQ(inverse.At(1, 1), 1);
+  EXPECT_THROW(inverse.At(1, 0), std::logic_error);
+}
 
 }  // namespace
 }  // namespace semblance

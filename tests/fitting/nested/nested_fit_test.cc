@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The fit that asks for no tolerance, on surfaces that are known.
+// The nested fit on known surfaces.
 #include "fitting/nested/nested_fit.h"
 
 #include <gmock/gmock.h>
@@ -37,7 +37,7 @@ NestedFitResult FitAuto(const FitTarget& target, Closure closure = Closure::kOpe
   return FitNested(StartSurface(shape, positions, uv), {positions, uv}, plan, context);
 }
 
-// A height field: noise in z alone.
+// A height field with noise in z alone.
 template <class Surface>
 FitTarget Heights(const Surface& surface, int count, double noise) {
   FitTarget target = Scattered(surface, count, noise, 5);
@@ -66,9 +66,8 @@ TEST(NestedFit, AClosedSurfaceInSpaceIsFoundAndCloses) {
   EXPECT_LT((left - right).norm(), 1e-9);
 }
 
-// The place of the seam does not matter, but for points that are left out by their place on a
-// curve.
-TEST(NestedFit, ATubeIsFoundAsWellWithItsSeamElsewhere) {
+// The place of the seam only affects which points are held out.
+TEST(NestedFit, ATubeIsFoundEquallyWellWithItsSeamElsewhere) {
   FitTarget target = Scattered(HeadPoint, 10000, 1e-3, 3);
   const double here =
       ErrorAgainst(HeadPoint, FitAuto(target, Closure::kPeriodicU).surface, 100).rms;
@@ -81,9 +80,9 @@ TEST(NestedFit, ATubeIsFoundAsWellWithItsSeamElsewhere) {
   EXPECT_NEAR(there, here, 0.1 * here);
 }
 
-// On the coarse levels the waves look like noise, and are smoothed away; on the finer ones the
-// smoothness that was chosen there must not hold.
-TEST(NestedFit, WavesThatCoarseLevelsTakeForNoiseAreFound) {
+// On coarse levels the waves look like noise and are smoothed away. The weight that was chosen
+// there must not persist on finer levels.
+TEST(NestedFit, WavesThatLookLikeNoiseToCoarseLevelsAreFound) {
   const auto waves = [](const Vec2& q) {
     return Vec3(q.x(), q.y(), 0.06 * std::sin(2 * std::numbers::pi * 20 * (q.x() + 0.1 * q.y())));
   };
@@ -92,7 +91,7 @@ TEST(NestedFit, WavesThatCoarseLevelsTakeForNoiseAreFound) {
   EXPECT_NEAR(fit.report.noise_mm, 5e-3, 5e-4);
 }
 
-// Waves that run in a direction of their own.
+// Waves along one oblique direction.
 auto SlantingWaves(double count) {
   return [count](const Vec2& q) {
     const double along = 0.8 * q.x() + 0.6 * q.y();
@@ -100,7 +99,7 @@ auto SlantingWaves(double count) {
   };
 }
 
-// Too few points for a surface that may bend alike along all directions.
+// The points are too few for a smoothness that is the same in all directions.
 TEST(NestedFit, WavesAlongOneDirectionNeedFewerPoints) {
   const auto waves = SlantingWaves(20);
   const FitTarget target = Heights(waves, 5000, 5e-3);
@@ -114,8 +113,8 @@ TEST(NestedFit, WavesAlongOneDirectionNeedFewerPoints) {
   EXPECT_EQ(alike.report.stretch, 1);
 }
 
-// One point in twenty, all on one side.
-TEST(NestedFit, OutliersAreFoundAndDoNoHarm) {
+// One point in twenty is an outlier, and all lie on one side.
+TEST(NestedFit, OutliersAreFoundAndHaveNoEffect) {
   FitTarget target = Heights(FrankePoint, 10000, 1e-3);
   Random random(9);
   std::vector<std::uint32_t> gross;
@@ -141,8 +140,9 @@ TEST(NestedFit, OutliersAreFoundAndDoNoHarm) {
   EXPECT_GT(ErrorAgainst(FrankePoint, kept.surface, 100).rms, 1e-2);
 }
 
-// As of a mesh whose layout squeezes most of it: nothing is seen of the rest of the domain.
-TEST(NestedFit, PointsInACornerOfTheDomainAreFollowedAsFarAsTheyTell) {
+// As in a mesh whose layout squeezes most of its area, there are no points in the rest of the
+// domain.
+TEST(NestedFit, PointsCrowdedInACornerAreFollowedToTheirDetail) {
   constexpr double kCorner = 1.0 / 32;
   FitTarget target = Heights(FrankePoint, 3000, 0);
   for (FitPoint& p : target.points) {
@@ -159,13 +159,13 @@ Vec3 StepPoint(const Vec2& uv) {
   return {uv.x(), uv.y(), 0.02 * std::sin(9 * uv.x()) + (uv.x() < edge ? 0 : 1)};
 }
 
-TEST(NestedFit, PointsAtAStepAreNoOutliers) {
+TEST(NestedFit, PointsAtAStepAreNotOutliers) {
   const NestedFitResult fit = FitAuto(Heights(StepPoint, 4000, 1e-3));
   EXPECT_LE(fit.report.outliers.size(), 10u);
 }
 
-// So many that as often as not two of eight neighbours are among them, by chance.
-TEST(NestedFit, GrossErrorsOfOneSizeAreNoSheet) {
+// There are so many gross errors that often two of eight neighbours are among them by chance.
+TEST(NestedFit, GrossErrorsOfEqualSizeAreNotASheet) {
   FitTarget target = Heights(FrankePoint, 10000, 1e-3);
   Random random(9);
   std::size_t gross = 0;
@@ -179,7 +179,7 @@ TEST(NestedFit, GrossErrorsOfOneSizeAreNoSheet) {
               0.1 * static_cast<double>(gross));
 }
 
-// Each with weight 1 / sigma^2. rough: whether a point is twenty times as far off as others.
+// Points with weight 1 / sigma^2. rough: whether a point has twenty times the noise of the others.
 template <class IsRough>
 FitTarget OfTwoKinds(int count, const IsRough& rough) {
   constexpr double kSigma = 1e-3;
@@ -206,7 +206,7 @@ NestedFitResult FitWeighted(const FitTarget& target) {
   return FitNested(StartSurface(shape, positions, uv), {positions, uv, weights}, {}, {});
 }
 
-// How many times its sigma a point is off, by a noise of one of mean weight.
+// The ratio of the errors to the points' sigma, from the noise of a point of mean weight.
 double SigmaFactor(const FitTarget& target, const AutoReport& report, double noise_mm) {
   double sum = 0;
   std::size_t count = 0;
@@ -219,8 +219,8 @@ double SigmaFactor(const FitTarget& target, const AutoReport& report, double noi
   return noise_mm * std::sqrt(sum / static_cast<double>(count));
 }
 
-// Where one point in five is rough, and where all but one in five are.
-TEST(NestedFit, PointsThatAreAsFarOffAsTheirSigmaSaysAreNoOutliers) {
+// One point in five is rough, or all but one in five are.
+TEST(NestedFit, PointsWithErrorsOfTheirSigmaAreNotOutliers) {
   for (const bool mostly_rough : {false, true}) {
     const FitTarget target = OfTwoKinds(10000, [&](int k) { return (k % 5 == 0) != mostly_rough; });
     const NestedFitResult fit = FitWeighted(target);
@@ -233,8 +233,8 @@ TEST(NestedFit, PointsThatAreAsFarOffAsTheirSigmaSaysAreNoOutliers) {
   }
 }
 
-// Off by 25 of the rough points' sigma, and by 500 of the others'.
-TEST(NestedFit, OutliersAmongPointsOfTwoKindsAreFound) {
+// The outliers lie 25 sigma of rough points away, which is 500 sigma of the others.
+TEST(NestedFit, OutliersAmongRoughAndPrecisePointsAreFound) {
   for (const bool mostly_rough : {false, true}) {
     FitTarget target = OfTwoKinds(10000, [&](int k) { return (k % 5 == 0) != mostly_rough; });
     std::vector<std::uint32_t> gross;
@@ -251,7 +251,7 @@ TEST(NestedFit, OutliersAmongPointsOfTwoKindsAreFound) {
   }
 }
 
-TEST(NestedFit, WeightsThatAreEqualChangeNothing) {
+TEST(NestedFit, EqualWeightsChangeNothing) {
   FitTarget target = Heights(FrankePoint, 5000, 1e-3);
   for (std::size_t k = 0; k < target.points.size(); ++k) {
     target.points[k].position.z() += k % 50 == 0 ? 0.3 : 0;
@@ -266,8 +266,8 @@ TEST(NestedFit, WeightsThatAreEqualChangeNothing) {
   EXPECT_EQ(with.report.neighbour_noise_mm, without.report.neighbour_noise_mm);
 }
 
-// A paraboloid is a bicubic spline: of points on a ring of it only rounding is left, which once
-// made thousands of vertices, or no smoothness that could be judged.
+// A paraboloid is a bicubic spline, so only round-off is left. Earlier, round-off caused thousands
+// of vertices, or no usable smoothness.
 TEST(NestedFit, AnExactShapeIsMetToRoundingAndNotRefined) {
   for (const std::uint64_t seed : {1, 2, 3, 4, 5, 6}) {
     Random random(seed);
@@ -292,8 +292,8 @@ TEST(NestedFit, AnExactShapeIsMetToRoundingAndNotRefined) {
   }
 }
 
-// Without noise, but not a spline: refined as far as the points go.
-TEST(NestedFit, AShapeThatIsNoSplineIsRefinedWithoutNoiseToo) {
+// The shape has no noise, but is not a spline, so it is refined as far as the points allow.
+TEST(NestedFit, AShapeWithoutNoiseThatIsNotASplineIsRefined) {
   const NestedFitResult fit = FitAuto(Heights(FrankePoint, 20000, 0));
   EXPECT_FALSE(fit.report.met_to_rounding);
   EXPECT_GE(fit.surface.shape().max_level, 2);
@@ -304,15 +304,16 @@ TEST(NestedFit, TheOrderOfThePointsHasNoEffect) {
   FitTarget target = Heights(FrankePoint, 3000, 1e-3);
   const NestedFitResult first = FitAuto(target);
   std::reverse(target.points.begin(), target.points.end());
-  // The start is a sum over the points, and so differs in its last digits.
+  // The start is a sum over the points in their given order, so its last digits differ.
   EXPECT_LT(ErrorAgainst([&](const Vec2& uv) { return first.surface.Point(uv); },
                          FitAuto(target).surface, 50)
                 .largest,
             1e-9);
 }
 
-// Rows of points, two by two; residuals that the two of a close pair share, or nobody.
-TEST(NestedFit, TheClosestPairsTellDetailFromNoise) {
+// Points come in close pairs. Residuals are either shared by the two points of a pair, or
+// independent.
+TEST(NestedFit, TheClosestPairsDistinguishDetailFromNoise) {
   NestedPoints points;
   points.channels = 1;
   std::vector<std::uint32_t> indices;
@@ -335,8 +336,7 @@ TEST(NestedFit, TheClosestPairsTellDetailFromNoise) {
   EXPECT_NEAR(all.Value(), 0.5, 0.1);
 }
 
-// What a fit says of each point is its distance from the surface, as given; a target is no
-// different from columns.
+// A fit to a target and a fit to columns give the same residuals.
 TEST(NestedFit, ResidualsAreTheDistancesInTheOrderGiven) {
   const FitTarget target = Scattered(HeadPoint, 3000, 1e-3, 3);
   std::vector<Vec3> positions;
@@ -390,7 +390,7 @@ std::string Refusal(Solver solver, const Term& term) {
   });
 }
 
-// Conjugate gradients and Ceres, of the same space, smoothness and points; outliers among them.
+// Compares conjugate gradients with Ceres for the same space, smoothness and points, with outliers.
 TEST(NestedFit, CeresFindsTheSameSurface) {
   FitTarget target = Heights(FrankePoint, 3000, 1e-3);
   for (std::size_t k = 0; k < target.points.size(); k += 100) {
@@ -418,7 +418,7 @@ TEST(NestedFit, CeresFindsTheSameSurface) {
   }
 }
 
-TEST(NestedFit, CeresFindsTheSameSurfaceInStretchedLengths) {
+TEST(NestedFit, CeresFindsTheSameSurfaceWithAStretch) {
   const FitTarget target = Heights(SlantingWaves(4), 2000, 5e-3);
   const FitResult fastest = FitBy(Solver::kFastest, {PointTerm{}, kSmooth}, target),
                   ceres = FitBy(Solver::kCeres, {PointTerm{}, kSmooth}, target);
@@ -429,7 +429,7 @@ TEST(NestedFit, CeresFindsTheSameSurfaceInStretchedLengths) {
       1e-3);
 }
 
-// A membrane as stiff as that lets the surface rise by hardly anything over its start.
+// The membrane is so stiff that the surface hardly rises over its start.
 TEST(NestedFit, WithCeresOtherTermsTakePart) {
   const FitTarget target = Heights(FrankePoint, 3000, 1e-3);
   const HSplineSurface start = PlaneUnder(target);
@@ -455,7 +455,7 @@ TEST(NestedFit, WithCeresOtherTermsTakePart) {
               HasSubstr("whose stretch it finds"));
 }
 
-TEST(NestedFit, WhatCannotBeFittedIsSaid) {
+TEST(NestedFit, UnusableInputIsNamed) {
   const FitTarget few = Scattered(FrankePoint, 10, 0, 1);
   EXPECT_THROW(FitAuto(few), InputError);
   HSplineSurface detailed = testing::PlainStart({.patches_u = 8, .patches_v = 8, .max_level = 1});
@@ -465,7 +465,7 @@ TEST(NestedFit, WhatCannotBeFittedIsSaid) {
   EXPECT_THROW(FitNested(detailed, {positions, uv}, {}, {}), InputError);
 }
 
-// Whatever offsets refer to, the surface that is written is the one that was measured.
+// The written surface is the measured one for either reference of offsets.
 TEST(NestedFit, OffsetsAlongTheAxesOfTheWorldGiveTheSameSurface) {
   const FitTarget target = Scattered(HeadPoint, 5000, 1e-3, 4);
   std::vector<Vec3> positions;

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Conjugate gradients over all levels, against the direct solve of one level and the definitions.
-#include "fitting/nested/nested_solve.h"
-
+// Compares conjugate gradients over all levels with the direct solve of one level and with the
+// definitions.
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
@@ -10,7 +9,8 @@
 #include <cmath>
 #include <utility>
 
-#include "fitting/solve/level_fit.h"
+#include "fitting/nested/nested_solve.h"
+#include "fitting/solve/space_solve.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/plain_bspline.h"
 #include "tests/testing/scattered_data.h"
@@ -103,7 +103,7 @@ TEST(NestedSolve, RefinementIsThatOfTheSurface) {
   }
 }
 
-// Some of the patches, apart from each other and across the seams.
+// Some patches, apart from each other and across the seam.
 std::vector<char> SomePatches(const GridLayout& layout) {
   std::vector<char> some(layout.Patches(), 0);
   for (const auto& [i, j] :
@@ -139,8 +139,8 @@ TEST(NestedSolve, RunsHoldEachVertexOfThePatchesOnce) {
   }
 }
 
-// The definition: the sum of the patches' products.
-TEST(NestedSolve, AStencilsProductIsTheSumOfThoseOfThePatches) {
+// By definition, the product is the sum of the patches' products.
+TEST(NestedSolve, AStencilProductIsTheSumOfPatchProducts) {
   for (const Closure closure : kClosures) {
     const GridLayout layout = Layout(closure);
     const std::vector<char> patches = SomePatches(layout);
@@ -173,11 +173,12 @@ TEST(NestedSolve, AStencilsProductIsTheSumOfThoseOfThePatches) {
   }
 }
 
-// All vertices of level 1 overlaid is level 1 as a plain B-spline, which a direct factor solves.
+// With all vertices of level 1 active the space is level 1 as a plain B-spline, which a direct
+// factor solves.
 class NestedSolveIn : public ::testing::TestWithParam<double> {};  // a stretch of lengths
 INSTANTIATE_TEST_SUITE_P(Lengths, NestedSolveIn, ::testing::Values(1.0, 2.5));
 
-TEST_P(NestedSolveIn, ALevelComesOutAsByADirectFactor) {
+TEST_P(NestedSolveIn, EqualsTheDirectSolveOfALevel) {
   const BendingStretch stretch{.stretch = GetParam(), .direction_deg = 30};
   for (const Closure closure : kClosures) {
     const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 1, .closure = closure};
@@ -191,7 +192,7 @@ TEST_P(NestedSolveIn, ALevelComesOutAsByADirectFactor) {
     space.Link();
     constexpr double kWeight = 1e-5;
     NestedSolve solve(points, MeanLengths(start));
-    solve.Begin(space, {}, MetricOf(stretch));
+    solve.Begin(space, {}, MakeBendingMetric(stretch));
     solve.SetWeight(kWeight);
     solve.Solve(0);
     const std::vector<Term> terms = {PointTerm{},
@@ -200,7 +201,7 @@ TEST_P(NestedSolveIn, ALevelComesOutAsByADirectFactor) {
                                                     .stretch = stretch.stretch,
                                                     .direction_deg = stretch.direction_deg}};
     const LevelSolution direct =
-        FitLevel(ViewOfLevel(start, start, target, 1, {.aim = FitAim::kLevel, .held = {}}), terms,
+        FitLevel(MakeLevelView(start, start, target, 1, {.aim = FitAim::kLevel, .held = {}}), terms,
                  Solver::kFastest);
     const NestedValues& displacements = solve.Displacements();
     const ControlNet net = start.Net(1);
@@ -216,13 +217,13 @@ TEST_P(NestedSolveIn, ALevelComesOutAsByADirectFactor) {
   }
 }
 
-// Lengths that change in between leave nothing of those before; the sums are of the same surface.
-TEST(NestedSolve, LengthsMayChange) {
+// After a change of the metric the solve equals one that began with it.
+TEST(NestedSolve, TheMetricMayChange) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0};
   const HSplineSurface start = PlainStart(shape);
   const NestedPoints points = DisplacementsOf(start, Scattered(HeadPoint, 1000, 0.01, 4));
   const NestedSpace space(shape);
-  const BendingMetric metric = MetricOf({.stretch = 3, .direction_deg = 120});
+  const BendingMetric metric = MakeBendingMetric({.stretch = 3, .direction_deg = 120});
   NestedSolve changed(points, MeanLengths(start)), at_once(points, MeanLengths(start));
   changed.Begin(space, {});
   changed.SetWeight(1e-4);
@@ -244,7 +245,7 @@ TEST(NestedSolve, LengthsMayChange) {
   }
 }
 
-// Of a vertex of a closed direction, at x patches, from the definition.
+// The B-spline of a vertex of a closed direction at x patches, by definition.
 double Around(double x, int vertex, int patches, int order) {
   double sum = 0;
   for (const int turn : {-1, 0, 1}) {
@@ -253,12 +254,12 @@ double Around(double x, int vertex, int patches, int order) {
   return sum * std::pow(patches, order);
 }
 
-// Of a vertex of an open direction.
+// The B-spline of a vertex of an open direction.
 double Along(double x, int vertex, int patches, int order) {
   return testing::CubicBSpline(x - vertex + 3, order) * std::pow(patches, order);
 }
 
-// A row of the functions of all vertices of a tube, or of their derivatives.
+// The B-splines of all vertices of a tube, or their derivatives, as a row.
 Eigen::RowVectorXd TubeRow(const HSplineShape& shape, const Vec2& uv, DerivativeOrder order) {
   const int m = shape.patches_u, n = shape.patches_v;
   Eigen::RowVectorXd row(m * shape.Rows(0));
@@ -347,7 +348,7 @@ TEST(NestedSolve, TheMeanSquareIsThatOfTheResiduals) {
       solve.SetWeight(weight);
       solve.Solve(1e-6);
       double sum = 0;
-      for (const NestedResidual& residual : solve.ResidualsOf(used)) {
+      for (const NestedResidual& residual : solve.Residuals(used)) {
         sum += residual.Square();
       }
       const double expected = sum / static_cast<double>(used.Count(points)) / points.channels;
@@ -356,7 +357,7 @@ TEST(NestedSolve, TheMeanSquareIsThatOfTheResiduals) {
   }
 }
 
-TEST(NestedSolve, ASolutionComesBackAsItWas) {
+TEST(NestedSolve, ASolutionCanBeRestored) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 1};
   const HSplineSurface start = PlainStart(shape);
   const NestedPoints points = DisplacementsOf(start, Scattered(HeadPoint, 500, 0, 4));
@@ -371,17 +372,18 @@ TEST(NestedSolve, ASolutionComesBackAsItWas) {
   const double before = solve.MeanSquare();
   solve.SetWeight(10);
   solve.Solve(0);
-  EXPECT_GT(solve.ResidualsOf({})[7].Square(), 0);
+  EXPECT_GT(solve.Residuals({})[7].Square(), 0);
   solve.SetSolution(packed);
   EXPECT_EQ(solve.Solution(), packed);
   double sum = 0;
-  for (const NestedResidual& residual : solve.ResidualsOf({})) {
+  for (const NestedResidual& residual : solve.Residuals({})) {
     sum += residual.Square();
   }
   EXPECT_NEAR(sum / 500 / points.channels, before, 1e-9 * before);
 }
 
-// Without smoothness and with points enough each vertex is determined: the trace counts them.
+// Without smoothness and with enough points each vertex is determined, and the trace counts the
+// vertices.
 TEST(NestedSolve, TheTraceIsTheNumberOfVerticesWithoutSmoothness) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 1};
   const HSplineSurface start = PlainStart(shape);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Weights between those that were tried, and what solving loosely may cost.
+// Tests weights between tried ones, and the cost of inexact solves.
 #include "fitting/nested/weight_search.h"
 
 #include <gtest/gtest.h>
@@ -19,7 +19,7 @@ using testing::Scattered;
 
 NestedWeight At(double weight, double score) { return {.weight = weight, .score = score}; }
 
-TEST(WeightBetween, IsWhereAParabolaOfLogarithmsIsLeast) {
+TEST(WeightBetween, MinimisesTheParabolaOfLogarithms) {
   constexpr double kLeast = 3e-5, kScore = 0.7;
   const auto at = [](double weight) {
     const double away = std::log(weight / kLeast);
@@ -30,10 +30,10 @@ TEST(WeightBetween, IsWhereAParabolaOfLogarithmsIsLeast) {
   }
 }
 
-TEST(WeightBetween, StaysAtTheMiddleWhereNothingIsLeastBetween) {
-  EXPECT_EQ(WeightBetween(At(1, 3), At(2, 2), At(4, 1)), 2);  // falls on
+TEST(WeightBetween, ReturnsTheMiddleWithoutAMinimumBetween) {
+  EXPECT_EQ(WeightBetween(At(1, 3), At(2, 2), At(4, 1)), 2);  // falling
   EXPECT_EQ(WeightBetween(At(1, 2), At(2, 2), At(4, 2)), 2);  // flat
-  EXPECT_EQ(WeightBetween(At(1, 1), At(2, 2), At(4, 1)), 2);  // most in the middle
+  EXPECT_EQ(WeightBetween(At(1, 1), At(2, 2), At(4, 1)), 2);  // largest in the middle
   EXPECT_EQ(WeightBetween(At(1, kNaN), At(2, 2), At(4, 3)), 2);
 }
 
@@ -66,22 +66,22 @@ class Search : public ::testing::Test {
   NestedSpace space_;
 };
 
-TEST_F(Search, SolvedLooselyFindsAWeightThatPredictsAsWell) {
+TEST_F(Search, InexactSolvesFindAnEquallyGoodWeight) {
   NestedWeightSearch exact(kCount, solve_, 1e-4, 0);
   exact.Scan();
   exact.Climb(2, exact.Finish().weight);
-  const double score = exact.Settle(exact.Between()).score;
+  const double score = exact.FinalSolve(exact.Between()).score;
   NestedWeightSearch loose(kCount, solve_, 0.1, 0);
   loose.Scan();
   loose.Climb(2, loose.Finish().weight);
-  EXPECT_NEAR(loose.Settle(loose.Between()).score / score, 1, 0.02);
+  EXPECT_NEAR(loose.FinalSolve(loose.Between()).score / score, 1, 0.02);
 }
 
-TEST_F(Search, SettlesAtTheWeightThatIsAskedFor) {
+TEST_F(Search, FinalSolveUsesTheGivenWeight) {
   NestedWeightSearch search(kCount, solve_, 0.1, 0);
   search.Climb(4, solve_.EvenWeight());
   const double weight = 1.7 * search.Finish().weight;
-  const NestedWeight settled = search.Settle(weight);
+  const NestedWeight settled = search.FinalSolve(weight);
   EXPECT_EQ(settled.weight, weight);
   EXPECT_EQ(search.Finish().weight, weight);
   EXPECT_GT(settled.degrees_of_freedom, 0);

@@ -126,7 +126,7 @@ TEST(Placement, TransformedSurfacesMoveAtEveryPoint) {
   }
 }
 
-TEST(Placement, ErrorsSayWhatToDo) {
+TEST(Placement, ErrorsNameTheRemedy) {
   const auto message = [](const auto& call) -> std::string {
     try {
       call();

@@ -15,7 +15,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A part of a sphere about the origin, longitude along u, latitude along v; normals point outwards.
+// A part of a sphere about the origin, with longitude along u and latitude along v; normals point
+// outwards.
 HSplineSurface Cap(double radius_mm) {
   const HSplineShape shape{.patches_u = 6, .patches_v = 5, .max_level = 3};
   ControlNet net{.columns = shape.Columns(0), .rows = shape.Rows(0), .vertices = {}};
@@ -78,7 +79,7 @@ TEST(Seeding, NoSeedLiesInAMaskAndOthersDoNotMove) {
   }
 }
 
-TEST(Seeding, TooFarOrFacingAwayIsMissed) {
+TEST(Seeding, PointsTooFarOrFacingAwayAreMissed) {
   const HSplineSurface cap = Cap(62);
   const SeedResult far = SeedCap(cap, {.level = 1, .max_distance_mm = 8});
   EXPECT_TRUE(far.points.empty());
@@ -92,7 +93,7 @@ TEST(Seeding, TooFarOrFacingAwayIsMissed) {
 }
 
 // A ray never takes the far side of the face, even if it is nearer.
-TEST(Seeding, TheNearestTriangleThatFacesAlongWins) {
+TEST(Seeding, TakesTheNearestTriangleThatFacesAlongTheRay) {
   TriMesh mesh = testing::Plate(200, 4);
   TriMesh below = mesh;
   for (Vec3& p : mesh.points) {
@@ -122,8 +123,8 @@ TEST(Seeding, TheNearestTriangleThatFacesAlongWins) {
   }
 }
 
-// A sheet with a narrow trough, 18 mm under a plate: its own normals cross before they arrive, the
-// smoothed ones do not; and where they would, the seeds that changed places are dropped.
+// A sheet with a narrow trough lies 18 mm under a plate. Its own normals cross before they reach
+// the plate, and the seeds that change places are dropped. The smoothed normals do not cross.
 TEST(Seeding, NeighboursKeepTheirPlaces) {
   TriMesh plate = testing::Plate(200, 8);
   for (Vec3& p : plate.points) {

@@ -29,7 +29,7 @@ Points PointsOf(const Place& place) {
   return points;
 }
 
-TEST(StartSurface, AnOpenOneReproducesPlanes) {
+TEST(StartSurface, AnOpenSurfaceReproducesPlanes) {
   const auto place = [](const Vec2& uv) {
     return Vec3(80 * uv.x() + 3, 10 * uv.x() - 60 * uv.y(), 5 + uv.y());
   };
@@ -41,9 +41,9 @@ TEST(StartSurface, AnOpenOneReproducesPlanes) {
   }
 }
 
-// A cubic B-spline whose vertices lie on a circle is a rounder figure a little inside of it: with n
-// patches around, its radius is (2 + cos(2 pi / n)) / 3 of the vertices' at the knots.
-TEST(StartSurface, APeriodicOneIsATube) {
+// A cubic B-spline with vertices on a circle lies slightly inside it: with n patches around, its
+// radius at the knots is (2 + cos(2 pi / n)) / 3 times the circle's.
+TEST(StartSurface, APeriodicSurfaceIsATube) {
   constexpr int kPatches = 16;
   const auto place = [](const Vec2& uv) {
     const double angle = 2 * std::numbers::pi * uv.x();

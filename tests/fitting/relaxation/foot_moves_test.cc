@@ -33,7 +33,7 @@ HSplineShape Shape(Closure closure) {
   return {.patches_u = 8, .patches_v = 8, .max_level = 0, .closure = closure};
 }
 
-// With (u,v) off by `error` (standard deviation).
+// Points with errors of (u,v) of the given standard deviation.
 template <class Surface>
 Columns Disturbed(const Surface& surface, Closure closure, int count, double noise, double error) {
   const HSplineShape shape = Shape(closure);
@@ -103,7 +103,7 @@ TEST(FootMoves, DisturbedUvComeNearToTheTrueOnes) {
   EXPECT_LT(median_error(moved.uv), 0.5 * median_error(off.uv));
 }
 
-// Without them the adaptive plan chases what (u,v) are off.
+// Without the moves the adaptive plan follows the errors of (u,v).
 TEST(FootMoves, DisturbedUvTakeFewerVerticesAtTheSameTolerance) {
   for (const Sample& sample : Samples()) {
     const Columns off = Disturbed(sample.surface, sample.closure, 5000, 1e-4, 0.005);
@@ -133,7 +133,7 @@ TEST(FootMoves, OutliersStay) {
   }
 }
 
-// Of a grid each of whose points moves by up to two cells.
+// Each point of a grid moves by up to two cells.
 TEST(FootMoves, NoTriangleTurnsOver) {
   const TriMesh mesh =
       testing::GridMesh([](const Vec2& uv) { return Vec3(uv.x(), uv.y(), 0); }, 20);
@@ -154,8 +154,8 @@ TEST(FootMoves, NoTriangleTurnsOver) {
   }
 }
 
-// A triangle across u = 1 is whole, and so are moves across it.
-TEST(FootMoves, TheSeamIsNoFold) {
+// Triangles and moves across u = 1 are not folds.
+TEST(FootMoves, TheSeamIsNotAFold) {
   const std::vector<Triangle> triangles = {{0, 1, 2}};
   const std::vector<Vec2> from = {{0.95, 0.4}, {0.05, 0.4}, {0.98, 0.6}};
   const std::vector<Vec2> wanted = {{0.96, 0.4}, {0.06, 0.4}, {0.01, 0.6}};

@@ -38,8 +38,8 @@ HSplineSurface Subject(const HSplineSurface& rest) {
   return subject;
 }
 
-// A lattice of 8 x 8 dowels on the subject, within noise_mm along each axis; their (u,v) are off by
-// up to `error` of the domain.
+// A lattice of 8 x 8 dowels on the subject, with noise_mm along each axis; their (u,v) have errors
+// of up to `error`.
 FitTarget Dowels(const HSplineSurface& subject, double error, std::uint64_t random_seed = 3,
                  double noise_mm = 0) {
   Random random(random_seed);
@@ -67,7 +67,7 @@ double HeldOutRms(const HSplineSurface& subject, const HSplineSurface& fitted) {
   return std::sqrt(sum / count);
 }
 
-// Every relaxation that moves points, in so many rounds each.
+// Every relaxation that moves points, with the given number of rounds.
 std::vector<Relaxation> EveryRelaxation(int rounds) {
   const PointMoves moves{.rounds = rounds};
   return {FootpointRelaxation{moves}, AlternatingRelaxation{{moves}},
@@ -86,7 +86,7 @@ FitOptions Options(const Relaxation& relaxation) {
   return options;
 }
 
-// The same in a tenth of the time, with relaxations of one round.
+// A faster version with relaxations of one round.
 FitOptions ShortOptions(Relaxation relaxation) {
   if (auto* const sliding = std::get_if<TangentDistanceRelaxation>(&relaxation)) {
     sliding->tangent_rounds = 1;
@@ -104,7 +104,7 @@ std::vector<Vec2> Places(const FitTarget& target) {
   return uv;
 }
 
-// Mean over three sets of dowels, known to 0.3 mm.
+// The mean over three sets of dowels with noise of 0.3 mm.
 double MeanHeldOutRms(double error, const Relaxation& relaxation, int steps) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   FitOptions options = Options(relaxation);
@@ -149,7 +149,8 @@ TEST(Relaxation, LeavesNoCrease) {
   }
 }
 
-// Points that lie in another order than their (u,v): some can only arrive by passing each other.
+// The points' order differs from that of their (u,v), so some can only arrive by passing each
+// other.
 TEST(Relaxation, NeverTurnsATriangleOver) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   int prevented = 0;
@@ -186,8 +187,8 @@ TEST(Relaxation, PenaltiesFall) {
   EXPECT_GT(some.max_move_mm, 1);
 }
 
-// Rounds between the first and the last measure nothing, which the result does not show.
-TEST(Relaxation, AResultTellsOfTheFirstPointsAndTheLast) {
+// Only the first and the last round measure penalties, and the result has both.
+TEST(Relaxation, AResultHasThePenaltiesBeforeAndAfter) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   const FitTarget target = Dowels(subject, 0.05);
   for (const Relaxation& relaxation : EveryRelaxation(2)) {
@@ -272,7 +273,7 @@ TEST(Relaxation, OrderOfPointsAndDuplicatesDoNotMatter) {
   }
 }
 
-// Points and penalties together, at full steps, so that each round ends where it was solved.
+// With full steps each round ends at its solution for points and penalties together.
 TEST(Relaxation, EveryKindBringsThePointsNearer) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   const FitTarget target = Dowels(subject, 0.05);
@@ -291,7 +292,7 @@ TEST(Relaxation, EveryKindBringsThePointsNearer) {
   }
 }
 
-// A (u,v) that was placed by hand, whatever the others do.
+// A (u,v) that was placed by hand does not move.
 TEST(Relaxation, AKeptPointStaysAndTheOthersMove) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2), subject = Subject(rest);
   FitTarget target = Dowels(subject, 0.05);
@@ -311,7 +312,7 @@ TEST(Relaxation, AKeptPointStaysAndTheOthersMove) {
   }
 }
 
-// Without the network's barrier points whose order is wrong can pass each other.
+// Without the barrier, points in the wrong order can pass each other.
 TEST(Relaxation, WithoutABarrierPointsPassEachOther) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2);
   FitTarget target = Dowels(rest, 0);
@@ -329,7 +330,7 @@ TEST(Relaxation, WithoutABarrierPointsPassEachOther) {
   EXPECT_LT((rest.Point(target.points[27].uv) - target.points[27].position).norm(), 1e-6);
 }
 
-TEST(Relaxation, OneThatCannotBeTakenSaysWhy) {
+TEST(Relaxation, UnusableRelaxationsAreRefused) {
   const HSplineSurface rest = SmoothSurface(Shape(), 2);
   const FitTarget target = Dowels(rest, 0);
   const auto message = [&](const FitOptions& options) -> std::string {

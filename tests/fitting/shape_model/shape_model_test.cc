@@ -79,7 +79,7 @@ double LargestDistance(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
   return most;
 }
 
-TEST(ShapeModel, WhatDisagreesIsRefused) {
+TEST(ShapeModel, InconsistentModelsAreRefused) {
   const auto fault = [](const ShapeModel& model) -> std::string {
     try {
       CheckShapeModel(model, "heads");
@@ -138,7 +138,7 @@ TEST(ShapeParameters, JacobianEqualsItsNumericTwin) {
     for (double& x : parameters.field) body(x);
   };
   each([&](double& x) { x += random.Uniform(-0.7, 0.7); });
-  const ShapeRow row = RowAt(model, field, {12, {0.2, 0.3, 0.5}});
+  const ShapeRow row = PointRowAt(model, field, {12, {0.2, 0.3, 0.5}});
   const Vec3 direction = Vec3(1, -2, 3).normalized();
   ShapeDerivatives derivatives;
   PlacedPoint(frame, row, parameters, &derivatives);
@@ -177,7 +177,7 @@ TEST(Whitening, IsTheInverseRootOfTheCovariance) {
   const Mat3 nn = spread.normal * spread.normal.transpose();
   const Mat3 c = 0.25 * nn + 16 * (Mat3::Identity() - nn) +
                  4 * spread.direction * spread.direction.transpose();
-  const Mat3 w = WhiteningOf(spread);
+  const Mat3 w = MakeWhitening(spread);
   EXPECT_TRUE((w * c * w.transpose()).isIdentity(1e-12));
 }
 
@@ -213,7 +213,7 @@ TEST(ShapeEstimate, AShapeOfTheModelIsRecoveredFromExactPoints) {
   EXPECT_NEAR(estimate.subject_from_model.scale, 1.02, 1e-4);
 }
 
-TEST(ShapeEstimate, TheSurfaceDrawsWhatNoTipReaches) {
+TEST(ShapeEstimate, TheSurfaceDrawsPointsFarFromTips) {
   const ShapeModel model = Dome();
   Eigen::VectorXd truth(4);
   truth << 0, 2, 1.5, 0;
@@ -231,7 +231,7 @@ TEST(ShapeEstimate, TheSurfaceDrawsWhatNoTipReaches) {
   EXPECT_LT(error(&shape), 0.7 * error(nullptr));
 }
 
-TEST(ShapeEstimate, OneFarTipIsOutvoted) {
+TEST(ShapeEstimate, OneFarTipHasLittleEffect) {
   const ShapeModel model = Dome();
   ShapeTarget target;
   for (int t = 0; t < std::ssize(model.mean.triangles); t += 6) {
@@ -259,7 +259,7 @@ TEST(ShapeEstimate, ThreadsChangeNoByte) {
   EXPECT_EQ(one.sigma_mm, four.sigma_mm);
 }
 
-TEST(ShapeEstimate, ATipThatIsNowhereIsRefused) {
+TEST(ShapeEstimate, ATipWithoutAPlaceIsRefused) {
   const ShapeModel model = Dome();
   ShapeTarget off_mesh, not_finite;
   off_mesh.tips = {{.label = "g", .at = {9999, {1, 0, 0}}, .position = {0, 0, 0}}};
@@ -268,7 +268,7 @@ TEST(ShapeEstimate, ATipThatIsNowhereIsRefused) {
   EXPECT_THROW(EstimateShape(model, not_finite, {}, {}), InputError);
 }
 
-// The posterior of the dome at its mean, seen at some of its points.
+// The posterior of the dome at its mean, with observations at some of its points.
 struct SeenDome {
   ShapeModel model = Dome();
   Eigen::MatrixXd field =
@@ -280,9 +280,9 @@ struct SeenDome {
     std::vector<ShapeObservation> seen;
     for (const int v : seen_vertices) {
       const PointSpread spread{.normal = Vec3::UnitZ(), .normal_sd_mm = 0.5, .tangent_sd_mm = 4};
-      seen.push_back({.row = RowOfVertex(model, field, v),
+      seen.push_back({.row = VertexRow(model, field, v),
                       .position = model.mean.points[v],
-                      .whitening = WhiteningOf(spread),
+                      .whitening = MakeWhitening(spread),
                       .loss_width = 3});
     }
     return SigmaOf(seen, population_sd, 20);
@@ -293,11 +293,11 @@ struct SeenDome {
                               double smooth_length_mm) const {
     std::vector<ShapeRow> rows;
     for (int v = 0; v < kSide * kSide; ++v) {
-      rows.push_back(RowOfVertex(model, field, v));
+      rows.push_back(VertexRow(model, field, v));
     }
     const std::vector<Vec3> up(rows.size(), Vec3::UnitZ());
     const ShapePosterior posterior =
-        PosteriorOf(frame, parameters, seen, {.population_sd = population_sd}, smooth_length_mm);
+        MakePosterior(frame, parameters, seen, {.population_sd = population_sd}, smooth_length_mm);
     return DeviationsAlong(frame, parameters, posterior, rows, up, 1);
   }
 };
@@ -321,7 +321,7 @@ TEST(ShapePosterior, AnObservationNeverRaisesSigmaAndLowersItWhereItIs) {
 TEST(ShapePosterior, WithoutObservationsItIsThePrior) {
   const SeenDome dome;
   const std::vector<double> sigma = dome.Sigma({});
-  const int v = 40;  // the top: no arm but upwards
+  const int v = 40;  // the top of the dome, right above the centre
   const Vec3 arm = dome.model.mean.points[v] - dome.frame.centre;
   const double modes = dome.model.modes.row(3 * v + 2).squaredNorm();
   const double pose = std::pow(0.03 * arm.z(), 2) + std::pow(100, 2) + arm.head<2>().squaredNorm();
@@ -330,8 +330,8 @@ TEST(ShapePosterior, WithoutObservationsItIsThePrior) {
   EXPECT_NEAR(dome.Sigma({}, 3)[v], std::sqrt(9 * modes + rest), 1e-6);
 }
 
-// A wider population matters where nothing is seen, and not where all is.
-TEST(ShapePosterior, AWiderPopulationIsUnsureOfWhatIsNotSeen) {
+// A wider population raises sigma where there are no observations, and not where there are many.
+TEST(ShapePosterior, AWiderPopulationRaisesSigmaWithoutObservations) {
   const SeenDome dome;
   const std::vector<int> seen = {0, 1, 2, 9, 10, 11, 18, 19, 20};  // a corner
   const std::vector<double> one = dome.Sigma(seen, 1), two = dome.Sigma(seen, 2);
@@ -339,8 +339,8 @@ TEST(ShapePosterior, AWiderPopulationIsUnsureOfWhatIsNotSeen) {
   EXPECT_GT(two[80], 1.5 * one[80]);
 }
 
-// What an error that all tips share adds to the variance is what the estimate moves by, squared.
-TEST(ShapePosterior, ASharedErrorCountsAsTheEstimateFollowsIt) {
+// A shared error of all tips adds the square of the estimate's move to the variance.
+TEST(ShapePosterior, ASharedErrorAddsTheSquaredMoveOfTheEstimate) {
   const ShapeModel model = Dome();
   ShapeTarget target;
   for (int t = 0; t < std::ssize(model.mean.triangles); t += 5) {
@@ -369,14 +369,14 @@ TEST(ShapePosterior, ASharedErrorCountsAsTheEstimateFollowsIt) {
   }
 }
 
-// Of errors that resemble each other over any distance there is one, which all share; of those that
-// do so over none each is its own.
+// Smooth errors with an infinite correlation length equal one shared error; with length zero they
+// are independent.
 TEST(ShapePosterior, SmoothErrorsLieBetweenOneForEachAndOneForAll) {
   const SeenDome dome;
   const auto sigma = [&](double smooth_length_mm, const std::vector<int>& sharing) {
     std::vector<ShapeObservation> seen;
     for (const int v : {12, 22, 40, 41, 66}) {
-      seen.push_back({.row = RowOfVertex(dome.model, dome.field, v),
+      seen.push_back({.row = VertexRow(dome.model, dome.field, v),
                       .position = dome.model.mean.points[v],
                       .whitening = Vec3::UnitZ().transpose() / 2,
                       .loss_width = 3,
@@ -408,8 +408,8 @@ TEST(ShapePosterior, SmoothErrorsLieBetweenOneForEachAndOneForAll) {
   EXPECT_LT(between[40], one[40]);
 }
 
-// What is drawn lies about the most likely shape as sigma says.
-TEST(ShapePosterior, DrawsSpreadAsSigmaSays) {
+// Draws scatter about the most likely shape with sigma.
+TEST(ShapePosterior, DrawsHaveTheSpreadOfSigma) {
   constexpr int kDraws = 600;
   const ShapeModel model = Dome();
   const TriMesh surface{model.mean.points, model.mean.triangles};
@@ -441,7 +441,7 @@ TEST(ShapePosterior, DrawsSpreadAsSigmaSays) {
   EXPECT_EQ(EstimateShape(model, target, options, {}).drawn.front(), estimate.drawn[6]);
 }
 
-// What the modes do not tell grows with the distance from the nearest tip, and moves no point.
+// The additional part of sigma grows with the distance from the nearest tip, and moves no point.
 TEST(ShapePosterior, SigmaGrowsWhereNoTipIsNear) {
   const ShapeModel model = Dome();
   ShapeTarget target;

@@ -30,7 +30,7 @@ double Wave(const Vec2& uv) {
   return 100 + 20 * std::sin(2 * std::numbers::pi * uv.x()) * std::cos(4 * uv.y());
 }
 
-// The head, refined where it has detail, and as many columns as asked for: a constant, a wave with
+// The head, refined where it has detail, with the given number of columns: a constant, a wave with
 // noise, a wave, and so on.
 Coloured ColouredHead(int columns, double noise) {
   const FitTarget target = testing::Scattered(testing::HeadPoint, 8000, 1e-4, 3);
@@ -53,7 +53,7 @@ Coloured ColouredHead(int columns, double noise) {
   return head;
 }
 
-TEST(AttributeFit, ColumnsComeBackHoweverManyThereAre) {
+TEST(AttributeFit, AnyNumberOfColumnsIsRecovered) {
   const Coloured head = ColouredHead(5, 3);
   const AttributeFit fit = FitAttributes(head.surface, head.Columns(), {}, 1);
   ASSERT_EQ(fit.columns.size(), 5u);
@@ -72,12 +72,12 @@ TEST(AttributeFit, ColumnsComeBackHoweverManyThereAre) {
     }
     squares += (values[1][k] - Wave(uv[k])) * (values[1][k] - Wave(uv[k]));
   }
-  EXPECT_LT(std::sqrt(squares / 500), 0.6);  // of the noise of 3, most is averaged out
+  EXPECT_LT(std::sqrt(squares / 500), 0.6);  // most of the noise of 3 is averaged out
   EXPECT_NEAR(fit.columns[1].rms, 3, 0.15);
   EXPECT_GT(fit.columns[1].weight, fit.columns[2].weight);  // each has its own smoothness
 }
 
-// The functions are in the surface's own space: no vertex is added.
+// The functions are in the surface's space, so no vertex is added.
 TEST(AttributeFit, VerticesAreThoseOfTheSurface) {
   const Coloured head = ColouredHead(2, 0);
   ASSERT_GT(head.surface.Offsets().size(), 50u);
@@ -88,8 +88,8 @@ TEST(AttributeFit, VerticesAreThoseOfTheSurface) {
   EXPECT_EQ(fit.surfaces[0].shape().closure, Closure::kPeriodicU);
 }
 
-// Any linear function of the columns is fitted as the columns are, at the same weight; here a unit
-// and an offset, which choose the same one.
+// The fit is linear in the columns at the same weight; a change of unit and an offset choose the
+// same weight.
 TEST(AttributeFit, TheUnitOfAColumnDoesNotMatter) {
   Coloured head = ColouredHead(2, 3);
   const AttributeFit before = FitAttributes(head.surface, head.Columns(), {}, 1);

@@ -35,8 +35,8 @@ double CleanRms(const FitTarget& target, AutoOr<double> weight) {
       .rms;
 }
 
-// The oracle knows the truth and tries every decade; the choice sees only the noisy points.
-TEST(AutoWeight, IsNearlyAsGoodAsTheBestThereIs) {
+// The oracle uses the truth and tries every decade; the choice uses the noisy points alone.
+TEST(AutoWeight, IsNearlyAsGoodAsTheOracle) {
   for (const double noise : {0.003, 0.03, 0.1}) {
     const FitTarget target = Scattered(FrankePoint, 600, noise, 4);
     double best = 1e300, worst = 0;
@@ -63,7 +63,7 @@ TEST(AutoWeight, MoreNoiseIsSmoothedMore) {
   }
 }
 
-// With the chosen number written down, the same surface; without `auto` nothing is chosen.
+// The chosen weight as a number gives the same surface. Without `auto` no weight is reported.
 TEST(AutoWeight, IsTheWeightThatIsReported) {
   const FitTarget target = Scattered(FrankePoint, 600, 0.03, 4);
   for (const Solver solver : {Solver::kFastest, Solver::kCeres}) {
@@ -76,7 +76,7 @@ TEST(AutoWeight, IsTheWeightThatIsReported) {
   }
 }
 
-// Brute force: the influence matrix itself, row by row.
+// Computes the influence matrix by brute force, row by row.
 TEST(AutoWeight, TheScoreIsThatOfCravenAndWahba) {
   const FitTarget target = Scattered(FrankePoint, 150, 0.03, 4);
   const int n = 150;
@@ -141,8 +141,8 @@ TEST(AutoWeight, WrongInputIsNamed) {
   EXPECT_EQ(message({PointTerm{.loss = RobustLoss::kHuber}, smooth}), "");
 }
 
-// No point is further off than the loss is wide, so its weights never change; many unknowns are
-// held by nothing but a tiny smoothness, along which steps could creep on for ever.
+// No point exceeds the width of the loss, so the weights never change. Many unknowns are held by a
+// tiny smoothness alone, along which reweighting could continue without end.
 TEST(AutoWeight, ALossThatMeetsNoOutlierIsSolvedOnce) {
   const FitTarget target = Scattered(FrankePoint, 100, 0, 9);
   const SmoothnessTerm smooth{.weight = AutoOr<double>::Auto()};

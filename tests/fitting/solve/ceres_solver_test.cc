@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The ways to solve a level agree.
-#include "fitting/solve/ceres_solver.h"
-
+// The solvers of a level agree.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
-#include "fitting/solve/coupled_solver.h"
-#include "fitting/solve/level_fit.h"
+#include "fitting/solve/ceres_solver.h"
+#include "fitting/solve/space_solve.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"
@@ -52,8 +50,7 @@ void ExpectAllAgree(const LevelView& view, const std::vector<Term>& terms, doubl
   EXPECT_EQ(a.free_vertices, b.free_vertices);
   EXPECT_EQ(a.termination, "convergence");
   EXPECT_LT(Distance(tiles, vertices), tolerance_mm);
-  const double cost =
-      CostOf(terms, view, direct.net);  // says little of vertices that are hardly held
+  const double cost = CostOf(terms, view, direct.net);  // depends little on weakly held vertices
   EXPECT_NEAR(CostOf(terms, view, tiles), cost, 1e-9 * cost + 1e-15);
 }
 
@@ -68,14 +65,14 @@ TEST(TileSolver, FindsWhatSingleVerticesFind) {
   ExpectAllAgree(NoisyView(), separable, 1e-9);
   for (const Term& term : separable) {
     if (!std::holds_alternative<PointTerm>(term)) {
-      // Landmarks do not hold the vertices at the border that points hardly hold.
+      // Points hold the vertices at the border weakly, and landmarks do not hold them at all.
       const bool more_points = std::holds_alternative<LandmarkTerm>(term);
       ExpectAllAgree(NoisyView(), {PointTerm{}, term}, more_points ? 1e-4 : 1e-6);
     }
   }
 }
 
-// Nets whose sides are no multiples of three, closed ones too; some vertices no term touches.
+// Nets whose sides are not multiples of three, open and closed, with vertices that no term affects.
 TEST(TileSolver, TilesCoverNetsOfAnySize) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     for (const int patches : {4, 5, 6}) {
@@ -102,7 +99,7 @@ TEST(TileSolver, TilesCoverNetsOfAnySize) {
   }
 }
 
-// Terms that couple x, y and z, each with all that do not, and those that are left to Ceres.
+// Terms that couple x, y and z, each with all separable terms; the rest is left to Ceres.
 TEST(CoupledSolver, FindsWhatCeresFinds) {
   int coupled = 0;
   for (const Term& term : AllTerms()) {

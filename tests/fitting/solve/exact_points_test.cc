@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points, borders and normals that are met exactly, against a dense system of equations.
+// Compares exact points, borders and normals with a dense system of equations.
 #include "fitting/solve/exact_points.h"
 
 #include <gmock/gmock.h>
@@ -27,7 +27,7 @@ const FitOptions kByTolerance = {.plan = AdaptivePlan{.tolerance_mm = 1e-3, .fin
                                  .terms = {PointTerm{}},
                                  .solver = Solver::kFastest};
 
-// Off the surface by 0.05, and one with a slanted normal.
+// Exact points 0.05 away from the surface, one of them with a slanted normal.
 std::vector<ExactPoint> SomePoints() {
   std::vector<ExactPoint> exact;
   Random random(11);
@@ -48,7 +48,7 @@ void ExpectMet(const HSplineSurface& surface, const std::vector<ExactPoint>& exa
   }
 }
 
-// The minimum of sum |e|^2 over all vertices' coordinates with Lagrange's multipliers beside them.
+// The minimum of sum |e|^2 over the coordinates of all vertices, with Lagrange multipliers.
 Eigen::VectorXd DenseOptimum(const HSplineShape& shape, const FitTarget& target) {
   const Eigen::Index vertices = shape.Columns(0) * shape.Rows(0), unknowns = 3 * vertices;
   const auto row = [&](const Vec2& uv, DerivativeOrder order, const Vec3& along) {
@@ -91,7 +91,7 @@ Eigen::VectorXd DenseOptimum(const HSplineShape& shape, const FitTarget& target)
   return system.fullPivLu().solve(right);
 }
 
-TEST(ExactPoints, TheRestIsTheLeastSquaresOfWhatIsLeft) {
+TEST(ExactPoints, AllOtherPointsAreFittedByLeastSquares) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 0};
   FitTarget target = Scattered(FrankePoint, 500, 1e-3, 2);
   target.exact = SomePoints();
@@ -105,8 +105,9 @@ TEST(ExactPoints, TheRestIsTheLeastSquaresOfWhatIsLeft) {
   }
 }
 
-// Closer together than the vertices: finer ones come for them, and the others stay.
-TEST(ExactPoints, FinerVerticesComeWhereTheyAreNeeded) {
+// The points are closer together than the vertices, so finer vertices are added there and nowhere
+// else.
+TEST(ExactPoints, FinerVerticesAreAddedWhereNeeded) {
   FitTarget target = Scattered(FrankePoint, 3000, 1e-3, 2);
   for (int k = 0; k < 4; ++k) {
     const Vec2 uv(0.5 + 0.01 * k, 0.5);
@@ -122,8 +123,8 @@ TEST(ExactPoints, FinerVerticesComeWhereTheyAreNeeded) {
   EXPECT_LT(fit.surface.Offsets().size(), 1500u);
 }
 
-// The plan that chooses all by itself; a whole border, and outliers elsewhere.
-TEST(ExactPoints, TheAutoPlanMeetsThemToo) {
+// The auto plan with a whole border of exact points, and outliers elsewhere.
+TEST(ExactPoints, TheAutoPlanMeetsThem) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     const auto truth = [&](const Vec2& uv) {
       return closure == Closure::kOpen ? FrankePoint(uv) : testing::HeadPoint(uv);
@@ -147,8 +148,8 @@ TEST(ExactPoints, TheAutoPlanMeetsThemToo) {
   }
 }
 
-// What is said of noise is said of the surface that meets it.
-TEST(ExactPoints, AnExactPointIsNoOutlier) {
+// The reported noise is that of the surface that meets the point.
+TEST(ExactPoints, AnExactPointIsNotAnOutlier) {
   FitTarget target = Scattered(FrankePoint, 4000, 1e-3, 2);
   target.points[77].position.z() += 3;
   FitPoint& lifted = target.points[98];
@@ -174,7 +175,7 @@ TEST(ExactPoints, AnExactPointIsNoOutlier) {
               std::sqrt(mean_square(fit) / mean_square(free)), 1e-2);
 }
 
-TEST(ExactPoints, WhatCannotBeIsRefused) {
+TEST(ExactPoints, ContradictionsAreRefused) {
   FitTarget target = Scattered(FrankePoint, 500, 1e-3, 2);
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};
   const auto refusal = [&](const FitOptions& options) {

@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/solve/level_fit.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include <utility>
 
 #include "fitting/least_squares/qr_compression.h"
+#include "fitting/solve/space_solve.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
@@ -56,7 +55,7 @@ TEST(ScheduleStep, ReproducesASurfaceOfTheSpace) {
   EXPECT_EQ(solution.summary.rank, static_cast<int>(truth.vertices.size()));
 }
 
-// The oracle: rows by the definitions of the terms (smoothness by quadrature of second
+// The oracle uses rows by the definitions of the terms (smoothness by quadrature of second
 // derivatives), dense least squares.
 struct DenseSystem {
   Eigen::MatrixXd a, b;
@@ -148,15 +147,15 @@ TEST(ScheduleStep, TakesTheNearestOfManySolutions) {
 }
 
 TEST(ScheduleStep, CoverageCountsThePointsOfEachPatch) {
-  const PatchCoverage odd = CoverageOf({0, 4, 1, 0, 9}), even = CoverageOf({3, 0, 8});
+  const PatchCoverage odd = MakeCoverage({0, 4, 1, 0, 9}), even = MakeCoverage({3, 0, 8});
   EXPECT_EQ(odd.patches, 5);
   EXPECT_EQ(odd.empty_patches, 2);
   EXPECT_EQ(odd.median_patch_points, 4);
   EXPECT_EQ(even.median_patch_points, 5.5);
-  EXPECT_TRUE(std::isnan(CoverageOf({0, 0}).median_patch_points));
+  EXPECT_TRUE(std::isnan(MakeCoverage({0, 0}).median_patch_points));
 }
 
-TEST(ScheduleStep, VerticesThatNoTermTouchesStayToTheBit) {
+TEST(ScheduleStep, VerticesWithoutAnyTermKeepTheirBits) {
   const ControlNet start = Sheet(8, 3, 1, 8);
   const LevelView view = View(start, Observe(Sheet(8, 3, 4, 9), 60, 10, 0, 0.49));  // patches 0..3
   const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
@@ -173,7 +172,7 @@ TEST(ScheduleStep, VerticesThatNoTermTouchesStayToTheBit) {
   EXPECT_EQ(solution.summary.uncovered_vertices, 4 * start.rows);
   EXPECT_EQ(solution.summary.coverage.patches, 8 * 3);
   EXPECT_EQ(solution.summary.coverage.empty_patches, 4 * 3);
-  // With a smoothness term they follow.
+  // With a smoothness term they move.
   const LevelSolution smooth = FitLevel(view, std::vector<Term>{PointTerm{}, SmoothnessTerm{}});
   EXPECT_EQ(smooth.summary.free_vertices, static_cast<int>(start.vertices.size()));
   EXPECT_GT((smooth.net.At(10, 3) - start.At(10, 3)).norm(), 1e-3);
@@ -199,8 +198,8 @@ double ObservationDistance(const LevelView& view, const ControlNet& a, const Con
   return largest;
 }
 
-// A disc of 36 mm without data: exact thin-plate smoothness stays bounded there however weak,
-// where sampled smoothness is known to run away.
+// In a disc of 36 mm without data, the exact thin-plate energy keeps the surface bounded for any
+// weight. A sampled energy is known to diverge.
 TEST(ScheduleStep, AHoleInTheDataStaysBounded) {
   const int m = 16, n = 12;
   const ControlNet rest = Sheet(m, n, 0, 0);
@@ -226,7 +225,7 @@ TEST(ScheduleStep, AHoleInTheDataStaysBounded) {
   }
 }
 
-// Random data, patches with few points, with many copies of one point, with points on one line.
+// Random data, patches with few points, many copies of one point, and points on one line.
 std::vector<LevelView> ViewsOfEveryRank() {
   std::vector<LevelView> views = {NoisyView()};
   views.push_back(View(Sheet(4, 3, 2, 1), Observe(Sheet(4, 3, 3, 2), 20, 3, 1)));
@@ -242,7 +241,7 @@ std::vector<LevelView> ViewsOfEveryRank() {
   return views;
 }
 
-// The points one by one, dense, without any reduction.
+// The dense rows of all points, without compression.
 ControlNet DenseMinimiser(const LevelView& view) {
   DenseSystem dense;
   AddPoints(view, dense);
@@ -258,7 +257,7 @@ ControlNet DenseMinimiser(const LevelView& view) {
   return net;
 }
 
-// Ceres stops where its cost no longer falls, so it is held to less.
+// Ceres stops when its cost no longer falls, so its tolerance is wider.
 TEST(ScheduleStep, ReducedPointsAndTheDirectPathKeepTheMinimiser) {
   const std::vector<Term> points = {PointTerm{}};
   const std::vector<Term> held = {PointTerm{}, SmoothnessTerm{}, MembraneTerm{}, PriorTerm{}};
@@ -332,7 +331,7 @@ TEST(ScheduleStep, TheCostFallsAndNoNeighbourIsBetter) {
   }
 }
 
-TEST(ScheduleStep, RobustLossesForgiveOutliers) {
+TEST(ScheduleStep, RobustLossesResistOutliers) {
   const ControlNet truth = Sheet(4, 3, 3, 2);
   std::vector<Observation> observations = Observe(truth, 300, 3);
   for (int k = 0; k < 15; ++k) {
@@ -347,7 +346,7 @@ TEST(ScheduleStep, RobustLossesForgiveOutliers) {
   const double plain = error(RobustLoss::kNone);
   EXPECT_LT(error(RobustLoss::kHuber), 0.3 * plain);
   EXPECT_LT(error(RobustLoss::kCauchy), 0.05 * plain);
-  // Tukey's loss needs a start near enough: that of the others.
+  // Tukey's loss needs a near start, so it starts from the result of the others.
   LevelView near = view;
   near.start = FitLevel(view, std::vector<Term>{PointTerm{.loss = RobustLoss::kHuber}}).net;
   const PointTerm tukey{.loss = RobustLoss::kTukey, .loss_width_mm = 10};

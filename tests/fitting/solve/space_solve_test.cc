@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/solve/space_solve.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,9 +9,12 @@
 #include "fitting/plan/fit_driver.h"
 #include "fitting/problem/placement.h"
 #include "fitting/problem/start_surface.h"
+#include "fitting/solve/space_solve.h"
 #include "fitting/solve/space_system.h"
+#include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
+#include "tests/testing/level_views.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
@@ -78,7 +79,7 @@ TEST(AdaptiveFit, ReproducesASurfaceWhoseVerticesAreKnown) {
     EXPECT_LT(LargestDistance(result.surface, truth), 1e-9);
     EXPECT_LT(result.point_rms_mm, 1e-9);
     const LevelSummary& last = result.levels.back();
-    EXPECT_EQ(last.rank, last.free_vertices);  // the points determine all
+    EXPECT_EQ(last.rank, last.free_vertices);  // the points determine every vertex
     EXPECT_EQ(last.uncovered_vertices, 0);
     EXPECT_GE(last.coverage.patches, 12);
     EXPECT_EQ(last.coverage.empty_patches, 0);
@@ -87,9 +88,9 @@ TEST(AdaptiveFit, ReproducesASurfaceWhoseVerticesAreKnown) {
   }
 }
 
-// The place of a tube's seam does not matter: with all points shifted by some patches the surface
-// is shifted, and finer vertices lie across u = 0.
-TEST(AdaptiveFit, ATubeHasNoSeamOfItsOwn) {
+// Shifting all points of a tube by some patches shifts the surface, and puts finer vertices across
+// u = 0.
+TEST(AdaptiveFit, ATubeHasNoSeam) {
   const HSplineShape shape{
       .patches_u = 8, .patches_v = 8, .max_level = 3, .closure = Closure::kPeriodicU};
   const FitTarget target = Scattered(testing::HeadPoint, 20000, 1e-4, 5);
@@ -141,12 +142,12 @@ TEST(AdaptiveFit, CoverageCountsThePointsOfEachPatch) {
   EXPECT_EQ(coverage.patches, 12);
   EXPECT_EQ(coverage.empty_patches, 1);
   EXPECT_EQ(coverage.median_patch_points, 6);  // of 1 .. 11
-  const PatchCoverage even = CoverageOf({0, 7, 4, 0, 1, 5});
+  const PatchCoverage even = MakeCoverage({0, 7, 4, 0, 1, 5});
   EXPECT_EQ(even.empty_patches, 2);
   EXPECT_EQ(even.median_patch_points, 4.5);
 }
 
-// The plain B-spline of one level, by the other path.
+// Compares with the fit of one level as a plain B-spline.
 TEST(AdaptiveFit, WithoutOverlaysItIsTheFitOfLevelZero) {
   const std::vector<Term> terms = {PointTerm{}, SmoothnessTerm{.weight = 0.05},
                                    MembraneTerm{.weight = 0.2, .of = SmoothnessOf::kSurface}};
@@ -165,7 +166,8 @@ TEST(AdaptiveFit, WithoutOverlaysItIsTheFitOfLevelZero) {
   }
 }
 
-// The gradient of the assembled system against differences of the cost, all levels' unknowns.
+// Compares the gradient of the assembled system with differences of the cost, for unknowns of all
+// levels.
 TEST(AdaptiveFit, TheSystemIsTheGradientOfTheCost) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 3};
   const HSplineSurface rest = RandomSurface(shape, 1), start = RandomSurface(shape, 1);
@@ -178,7 +180,7 @@ TEST(AdaptiveFit, TheSystemIsTheGradientOfTheCost) {
   const double scale = 1 / cloud.weight_sum();
   const auto cost = [&] {
     space.Measure({}, 1, nullptr);
-    return scale * space.Squares() + EnergyOf(space, forms);
+    return scale * space.Squares() + TotalEnergy(space, forms);
   };
   Random random(3);
   Eigen::MatrixX3d step(space.rows(), 3);
@@ -218,8 +220,8 @@ TEST(AdaptiveFit, FrankesFunctionWithinItsNoise) {
   EXPECT_NEAR(result.point_rms_mm, 1e-3 * std::sqrt(3), 2e-4);
 }
 
-// The finer a tolerance below the noise, the more vertices chase it; between the points the surface
-// stays within the noise all the same.
+// A tolerance below the noise adds many vertices, but between the points the surface stays within
+// the noise.
 TEST(AdaptiveFit, NoToleranceIsTooFineForTheSurfaceBetweenThePoints) {
   constexpr double kNoise = 1e-3;
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 5};
@@ -304,7 +306,8 @@ TEST(AdaptiveFit, IsEquivariantUnderRigidMotion) {
   EXPECT_LT(LargestDistance(b, a, pose), 1e-9);
 }
 
-// One point in fifty is 0.3 off; a loss takes no notice of them, and none is overlaid.
+// One point in fifty has an error of 0.3. A loss ignores these points, and no vertices are added
+// for them.
 TEST(AdaptiveFit, OutliersDoNotBreakARobustFit) {
   FitTarget target = Scattered(HeadPoint, 20000, 1e-4, 9);
   for (std::size_t k = 0; k < target.points.size(); k += 50) {
@@ -320,7 +323,7 @@ TEST(AdaptiveFit, OutliersDoNotBreakARobustFit) {
   EXPECT_GT(ErrorAgainst(HeadPoint, plain.surface, 100).rms, 5e-3);
 }
 
-// A hole of 30 % of the width: where no point is, the surface bridges and does not swing.
+// In a hole of 30 % of the width the surface bridges and does not oscillate.
 TEST(AdaptiveFit, SmoothnessBridgesAHole) {
   const HSplineShape shape{.patches_u = 16, .patches_v = 16, .max_level = 3};
   FitTarget target = Scattered(FrankePoint, 20000, 1e-3, 9);
@@ -346,7 +349,8 @@ TEST(AdaptiveFit, FeaturesGetTheirOffsetsBack) {
               1e-12);
 }
 
-// Points that bulge on one side alone: both sides share it, and finer vertices come in pairs.
+// The points bulge on one side. Both sides of the surface share the bulge, and finer vertices
+// appear in pairs.
 TEST(AdaptiveFit, SymmetryMakesBothSidesAlikeOnAllLevels) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
   const auto bump = [](const Vec2& uv) {
@@ -358,7 +362,7 @@ TEST(AdaptiveFit, SymmetryMakesBothSidesAlikeOnAllLevels) {
       Fit(PlainStart(shape), target, {}, Adaptive(2e-2, 1, {PointTerm{}, symmetry}), {}).surface;
   ASSERT_FALSE(surface.Offsets(1).empty());
   for (const auto& [vertex, offset] : surface.Offsets()) {
-    EXPECT_TRUE(surface.Offset(MirrorOf(shape, vertex)).has_value());
+    EXPECT_TRUE(surface.Offset(MirrorVertex(shape, vertex)).has_value());
   }
   double highest = 0;
   for (int k = 0; k < 400; ++k) {
@@ -370,7 +374,7 @@ TEST(AdaptiveFit, SymmetryMakesBothSidesAlikeOnAllLevels) {
   EXPECT_NEAR(highest, 0.05, 0.01);  // the mean of a bulge and none
 }
 
-TEST(AdaptiveFit, FrozenFeaturesKeepTheirOffsetsAndTheOthersMakeDo) {
+TEST(AdaptiveFit, FrozenFeaturesKeepTheirOffsetsAndTheOthersAdapt) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 2};
   const HSplineSurface start = RandomSurface(shape, 2);
   std::vector<VertexId> features;
@@ -420,9 +424,9 @@ TEST(AdaptiveFit, WrongInputIsNamed) {
   EXPECT_THAT(message(Adaptive(1, 1, {SmoothnessTerm{}})), HasSubstr("no term 'points'"));
 }
 
-// A smoothness that leaves next to nothing to the points makes a matrix that doubles hardly tell
-// from a singular one. Of one of these sheets the steps grew without end, to 1e112 mm.
-TEST(CoupledSolve, StepsThatLeadAwayAreNotTaken) {
+// A very strong smoothness makes the matrix nearly singular in double precision. The steps of one
+// of these sheets once grew without bound, to 1e112 mm.
+TEST(CoupledSolve, DivergingStepsAreRejected) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
   const FitOptions options{
       .plan =
@@ -448,6 +452,99 @@ TEST(CoupledSolve, StepsThatLeadAwayAreNotTaken) {
         Fit(StartSurface(shape, positions, uv), TargetOf(positions, uv), {}, options, {});
     EXPECT_LT(fit.point_rms_mm, 0.3) << seed;
   }
+}
+
+using testing::Observe;
+using testing::Sheet;
+using testing::View;
+
+// 400 points on 12 patches; one in twenty has an error of 4 mm, and one in fifty is a landmark.
+LevelView ViewWithOutliers() {
+  std::vector<Observation> observations = Observe(Sheet(4, 3, 1, 2), 400, 3, 0.3);
+  for (std::size_t k = 0; k < observations.size(); k += 20) {
+    observations[k].position += Vec3(0, 0, 4);
+  }
+  for (std::size_t k = 7; k < observations.size(); k += 50) {
+    observations[k].landmark = true;
+  }
+  return View(Sheet(4, 3, 1, 1), std::move(observations));
+}
+
+std::vector<Term> RobustTerms(RobustLoss loss, double width_mm) {
+  return {PointTerm{.weight = 2, .loss = loss, .loss_width_mm = width_mm},
+          LandmarkTerm{.weight = 0.5}, MembraneTerm{.weight = 0.02}, PriorTerm{.weight = 1e-4}};
+}
+
+double CostOf(const LevelView& view, const std::vector<Term>& terms, const ControlNet& net) {
+  double sum = 0;
+  for (const Term& term : terms) {
+    sum += std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
+  }
+  return sum;
+}
+
+double LargestMove(const ControlNet& a, const ControlNet& b) {
+  double largest = 0;
+  for (std::size_t k = 0; k < a.vertices.size(); ++k) {
+    largest = std::max(largest, (a.vertices[k] - b.vertices[k]).norm());
+  }
+  return largest;
+}
+
+class EachLoss : public ::testing::TestWithParam<std::pair<RobustLoss, double>> {};
+
+// Compressing the points of each patch in every step gives the surface of the plain form with one
+// residual per point.
+TEST_P(EachLoss, CompressedEqualsThePlainForm) {
+  const LevelView view = ViewWithOutliers();
+  const auto [loss, width_mm] = GetParam();
+  const std::vector<Term> terms = RobustTerms(loss, width_mm);
+  ControlNet plain = view.start;
+  ASSERT_TRUE(SolveByCeres(view, terms, plain).usable);
+  for (const Solver solver : {Solver::kCeres, Solver::kFastest}) {
+    const LevelSolution reduced = FitLevel(view, terms, solver);
+    EXPECT_TRUE(reduced.summary.usable);
+    EXPECT_EQ(reduced.summary.termination, "convergence");
+    EXPECT_LT(LargestMove(reduced.net, plain), 1e-5);
+    EXPECT_NEAR(CostOf(view, terms, reduced.net), CostOf(view, terms, plain),
+                1e-9 * CostOf(view, terms, plain));
+  }
+}
+
+// Repeats single steps with the weights of the present surface.
+TEST_P(EachLoss, TheCostFallsWithEveryStep) {
+  LevelView view = ViewWithOutliers();
+  const auto [loss, width_mm] = GetParam();
+  std::vector<Term> terms = RobustTerms(loss, width_mm);
+  std::get<PriorTerm>(terms.back()).towards = PriorTowards::kTemplate;
+  double cost = CostOf(view, terms, view.start);
+  for (int k = 0; k < 10; ++k) {
+    const NormalSystem system = LevelSolve(view, terms, Solver::kFastest).System(terms);
+    const Eigen::MatrixXd step = SparseFactor(system.lower, 0).Solve(system.right);
+    for (std::size_t v = 0; v < view.start.vertices.size(); ++v) {
+      view.start.vertices[v] += step.row(static_cast<Eigen::Index>(v)).transpose();
+    }
+    const double next = CostOf(view, terms, view.start);
+    EXPECT_LE(next, cost * (1 + 1e-12)) << k;
+    cost = next;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Losses, EachLoss,
+                         ::testing::Values(std::pair(RobustLoss::kHuber, 0.5),
+                                           std::pair(RobustLoss::kCauchy, 1.0),
+                                           std::pair(RobustLoss::kTukey, 12.0)));
+
+TEST(Reweighting, PointsWithoutPullLeaveTheSurfaceToOtherTerms) {
+  LevelView view = ViewWithOutliers();
+  for (Observation& o : view.observations) {
+    o.position += Vec3(0, 0, 500);  // beyond Tukey's width
+  }
+  const std::vector<Term> terms = {PointTerm{.loss = RobustLoss::kTukey, .loss_width_mm = 1},
+                                   PriorTerm{.weight = 1, .towards = PriorTowards::kTemplate}};
+  const LevelSolution solution = FitLevel(view, terms, Solver::kFastest);
+  EXPECT_TRUE(solution.summary.usable);
+  EXPECT_LT(LargestMove(solution.net, view.rest), 1e-6);
 }
 
 }  // namespace

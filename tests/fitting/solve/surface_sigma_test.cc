@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a fit may be off, against dense algebra and against the truth.
+// Compares sigma with dense algebra and with the truth.
 #include "fitting/solve/surface_sigma.h"
 
 #include <gtest/gtest.h>
@@ -41,7 +41,7 @@ Points PointsAt(int count, std::uint64_t seed) {
   return points;
 }
 
-// Two levels, and each unknown's function as a surface that is 1 where it is.
+// Two levels, and the B-spline of each unknown as a surface.
 HSplineSurface Refined(Closure closure) {
   HSplineSurface surface =
       testing::PlainStart({.patches_u = 5, .patches_v = 3, .max_level = 1, .closure = closure});
@@ -112,7 +112,7 @@ TEST(SurfaceSigma, IsThatOfDenseLeastSquares) {
       }
     };
     expect(sigma, inverse);
-    // Held at five places, one of them twice.
+    // The surface is held at five places, one of them twice.
     std::vector<Vec2> met = PointsAt(5, 11).uv;
     met.push_back(met[0]);
     const SurfaceSigma held(surface, points.Columns(), left_out,
@@ -131,8 +131,8 @@ TEST(SurfaceSigma, IsThatOfDenseLeastSquares) {
   }
 }
 
-// A fit by other means says how many parameters its smoothness leaves: its one random probe is off
-// by sqrt(2 of them) at most.
+// The nested fit estimates the number of parameters with one random probe, whose standard deviation
+// is at most sqrt(2 n) for n parameters.
 TEST(SurfaceSigma, CountsTheParametersOfTheFitAndHoldsTheTruth) {
   constexpr int kCount = 20000;
   constexpr double kNoise = 1e-3;
@@ -162,8 +162,8 @@ TEST(SurfaceSigma, CountsTheParametersOfTheFitAndHoldsTheTruth) {
   EXPECT_NEAR(within / 4000.0, 0.90, 0.06);
 }
 
-// Waves along one direction leave fewer parameters in lengths that are stretched along the crests.
-TEST(SurfaceSigma, CountsInTheLengthsOfTheFit) {
+// With a stretch along the crests, waves along one direction leave fewer parameters.
+TEST(SurfaceSigma, UsesTheStretchOfTheFit) {
   Points points = PointsAt(2000, 5);
   points.weights.clear();
   Random random(6);
@@ -194,7 +194,7 @@ TEST(SurfaceSigma, CountsInTheLengthsOfTheFit) {
   EXPECT_GT(std::abs(counted() - stretched), 0.2 * stretched);
 }
 
-TEST(SurfaceSigma, WhatIsNotDeterminedIsLarge) {
+TEST(SurfaceSigma, IsLargeWhereNothingIsDetermined) {
   const HSplineSurface surface = Refined(Closure::kOpen);
   const SigmaOptions options{.noise_mm = 1, .weight = 0, .lengths_mm = {1, 1}};
   const std::vector<Vec2> middle = {{0.5, 0.5}};

@@ -20,11 +20,11 @@ HSplineSurface Template() {
 
 const auto kEverywhere = [](const Vec3&) { return true; };
 
-TEST(MetricDistortion, IsNoneForAMovedAndKnownForAScaledSurface) {
+TEST(MetricDistortion, IsZeroForAMovedSurfaceAndExactForAScaledOne) {
   const HSplineSurface rest = Template();
   const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).matrix();
   const auto moved = [&](double scale) {
-    return DistortionWhere(
+    return MeasureDistortion(
         Transformed(rest, {.scale = scale, .rotation = turn, .translation = Vec3(1, 2, 3)}), rest,
         kEverywhere);
   };
@@ -35,19 +35,19 @@ TEST(MetricDistortion, IsNoneForAMovedAndKnownForAScaledSurface) {
   EXPECT_NEAR(moved(1.1).rms_area, 0.21, 1e-10);
 }
 
-TEST(MetricDistortion, LooksOnlyWhereItIsWanted) {
+TEST(MetricDistortion, CoversOnlyTheWantedPlaces) {
   const HSplineSurface rest = Template();
   HSplineSurface surface = rest;
-  // Its patches: columns 6..9 of 16, rows 2..5 of 12.
+  // The offset moves columns 6..9 of 16 and rows 2..5 of 12 of the patches.
   surface.SetOffsets({{{2, 9, 5}, Vec3(1, 2, 3)}});
   const Vec3 place = rest.Point(rest.ParameterOf({2, 9, 5}));
   const auto near = [&](const Vec3& p) { return (p - place).norm() < 8; };
   const auto far = [&](const Vec3& p) { return p.z() > 60; };
-  const MetricDistortion all = DistortionWhere(surface, rest, kEverywhere),
-                         there = DistortionWhere(surface, rest, near),
-                         elsewhere = DistortionWhere(surface, rest, far),
+  const MetricDistortion all = MeasureDistortion(surface, rest, kEverywhere),
+                         there = MeasureDistortion(surface, rest, near),
+                         elsewhere = MeasureDistortion(surface, rest, far),
                          nowhere =
-                             DistortionWhere(surface, rest, [](const Vec3&) { return false; });
+                             MeasureDistortion(surface, rest, [](const Vec3&) { return false; });
   EXPECT_GT(there.rms_strain, 2 * all.rms_strain);
   EXPECT_GT(there.rms_strain, 1e-2);
   EXPECT_LT(there.area_cm2, 0.5 * all.area_cm2);
@@ -56,15 +56,15 @@ TEST(MetricDistortion, LooksOnlyWhereItIsWanted) {
   EXPECT_TRUE(std::isnan(nowhere.rms_strain));
 }
 
-// The area is the integral of the Jacobian.
-TEST(MetricDistortion, KnowsItsArea) {
+TEST(MetricDistortion, AreaIsTheIntegralOfTheJacobian) {
   const HSplineSurface rest = Template();
   double area = 0;
   constexpr int kSide = 200;
   for (int k = 0; k < kSide * kSide; ++k) {
     area += rest.Frame(Vec2((k % kSide + 0.5) / kSide, (k / kSide + 0.5) / kSide)).Jacobian();
   }
-  EXPECT_NEAR(DistortionWhere(rest, rest, kEverywhere).area_cm2, area / kSide / kSide / 100, 0.05);
+  EXPECT_NEAR(MeasureDistortion(rest, rest, kEverywhere).area_cm2, area / kSide / kSide / 100,
+              0.05);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a direct factor takes of points that may slide, against the rows that Ceres takes.
+// Compares the normal equations for a direct factor with the rows for Ceres.
 #include "fitting/terms/tangent_points.h"
 
 #include <ceres/crs_matrix.h>
@@ -89,11 +89,11 @@ void ExpectTheSame(const LevelView& view) {
   }
 }
 
-TEST(TangentSums, OfALevelAreThoseOfItsRows) { ExpectTheSame(testing::NoisyView()); }
+TEST(TangentSums, OfALevelEqualThoseOfItsRows) { ExpectTheSame(testing::NoisyView()); }
 
-// Finer vertices in one corner, so that elements have other dofs than their sixteen vertices; and a
-// surface without a normal, which holds points on all sides alike.
-TEST(TangentSums, OfAllLevelsAreThoseOfTheirRows) {
+// Finer vertices in one corner make elements whose dofs differ from their sixteen vertices. The
+// second surface has no normal, so its points are held in every direction.
+TEST(TangentSums, OfAllLevelsEqualThoseOfTheirRows) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 3};
   for (const bool has_normal : {true, false}) {
     ControlNet net = testing::Sheet(4, 3, 5, 1);
@@ -106,7 +106,7 @@ TEST(TangentSums, OfAllLevelsAreThoseOfTheirRows) {
     const PointCloud cloud(shape, target);
     HierarchicalSplineSpace space(start, start, cloud);
     space.Edit(std::vector<VertexId>{{1, 1, 1}, {1, 2, 1}, {2, 3, 3}, {3, 7, 7}});
-    const LevelView view = ViewOfSpace(space, cloud, target, {130, 80});
+    const LevelView view = MakeSpaceView(space, cloud, target, {130, 80});
     int mixed = 0;
     for (int e = 0; e < view.elements(); ++e) {
       mixed += view.Element(e).IsIdentity() ? 0 : 1;

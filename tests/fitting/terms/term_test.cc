@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Laws that every term obeys; a new entry of the variant is tested without being named here.
+// Laws that every term obeys. A new entry of the variant is covered without being named here.
 #include "fitting/terms/term.h"
 
 #include <ceres/crs_matrix.h>
@@ -20,7 +20,7 @@ using testing::AllTerms;
 using testing::NoisyView;
 using testing::Sheet;
 
-// Half the cost, and the Jacobian, as Ceres sees them.
+// Half the cost and the Jacobian, evaluated by Ceres.
 struct Evaluated {
   double cost = kNaN;
   Eigen::MatrixXd jacobian;
@@ -123,7 +123,7 @@ TEST(Terms, TangentPointsWithoutSlidingArePoints) {
   const double points = TermCost(PointTerm{}, view, view.start);
   EXPECT_NEAR(TermCost(TangentPointTerm{.tangential = 1}, view, view.start), points,
               1e-12 * points);
-  // A flat sheet that slides within itself costs only what sliding is said to.
+  // A flat sheet that slides within itself costs only the tangential part.
   LevelView flat = view;
   for (ControlNet* const net : {&flat.start, &flat.rest}) {
     *net = Sheet(4, 3, 0, 0);
@@ -148,8 +148,9 @@ TEST(Terms, LandmarksAreThePointsThatAreLandmarks) {
   EXPECT_GT(std::abs(TermCost(PointTerm{.weight = 3}, view, view.start) - points), 1e-3);
 }
 
-// Among points that say something else, the more the landmarks weigh the nearer the surface is.
-TEST(Terms, LandmarksAreMetTheMoreTheyWeigh) {
+// The points disagree with the landmarks, and the surface comes nearer to the landmarks as their
+// weight grows.
+TEST(Terms, AHigherLandmarkWeightBringsTheSurfaceNearerToLandmarks) {
   LevelView view = NoisyView();
   for (Observation& o : view.observations) {
     o.position.z() += o.landmark ? 5 : 0;
@@ -164,7 +165,7 @@ TEST(Terms, LandmarksAreMetTheMoreTheyWeigh) {
   EXPECT_LT(last, 0.1);
 }
 
-TEST(Terms, LandmarksAreAskedForWhereThereAreNone) {
+TEST(Terms, ALandmarkTermWithoutLandmarksIsAnError) {
   LevelView view = NoisyView();
   for (Observation& o : view.observations) {
     o.landmark = false;
@@ -173,7 +174,7 @@ TEST(Terms, LandmarksAreAskedForWhereThereAreNone) {
   EXPECT_THROW(FitLevel(view, terms), InputError);
 }
 
-// Mirrored at the sheet's plane x = 40, wherever the whole is turned to.
+// The displacements are mirrored at the sheet's plane x = 40, and then all is rotated.
 TEST(Terms, MirroredDisplacementsAreSymmetric) {
   LevelView view = NoisyView();
   const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).matrix();
@@ -195,7 +196,7 @@ TEST(Terms, MirroredDisplacementsAreSymmetric) {
   EXPECT_NEAR(TermCost(SymmetryTerm{.weight = 1}, view, view.start), 2.0 / 42, 1e-12);
 }
 
-TEST(Terms, APriorOfTheHeldLooksAtThemAlone) {
+TEST(Terms, APriorOfHeldVerticesCountsThemAlone) {
   LevelView view = NoisyView();
   ControlNet net = view.start;
   view.held = {3, 8};
@@ -207,8 +208,9 @@ TEST(Terms, APriorOfTheHeldLooksAtThemAlone) {
   EXPECT_EQ(TermCost(term, view, view.start), 0);
 }
 
-// Shares and standard deviations as they come; the surface everywhere k of these above the shape.
-TEST(Terms, StandardDeviationsFromThePriorsShapeCostTheWeight) {
+// The surface lies 2 standard deviations above the shape everywhere; shares and deviations are
+// random.
+TEST(Terms, APriorsShapeCostsWeightTimesSquaredDeviations) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 3, .max_level = 0};
   const HSplineSurface surface(shape, Sheet(4, 3, 2, 1));
   FitTarget target;
@@ -221,11 +223,11 @@ TEST(Terms, StandardDeviationsFromThePriorsShapeCostTheWeight) {
                             .sd_mm = sd_mm,
                             .share = random.Uniform(0.5, 2)});
   }
-  const LevelView view = ViewOfLevel(surface, surface, target, 0);
+  const LevelView view = MakeLevelView(surface, surface, target, 0);
   EXPECT_NEAR(TermCost(PriorShapeTerm{.weight = 3}, view, view.start), 3 * 4, 1e-11);
 }
 
-TEST(Terms, APriorsShapeIsKeptTheMoreItWeighs) {
+TEST(Terms, AHigherPriorWeightKeepsTheShapeBetter) {
   const LevelView view = NoisyView();
   double last = std::numeric_limits<double>::infinity();
   for (const double weight : {0.0, 0.1, 10.0, 1e4}) {
@@ -236,7 +238,7 @@ TEST(Terms, APriorsShapeIsKeptTheMoreItWeighs) {
   }
 }
 
-TEST(Terms, APriorsShapeIsAskedForWhereThereIsNone) {
+TEST(Terms, APriorShapeTermWithoutAShapeIsAnError) {
   LevelView view = NoisyView();
   view.likely.clear();
   const std::array<Term, 2> terms = {PointTerm{}, PriorShapeTerm{}};
@@ -247,7 +249,7 @@ TEST(Terms, APriorsShapeIsAskedForWhereThereIsNone) {
   EXPECT_THROW(CheckTarget(target), InputError);
 }
 
-TEST(Terms, BoneIsNotPenetrated) {
+TEST(Terms, NonPenetrationKeepsTheSurfaceOutsideTheBone) {
   LevelView view = NoisyView();
   for (BoneObservation& o : view.bone) {
     o.foot = view.grid.StencilAt(o.point.uv).Apply(view.start) - Vec3(0, 0, 3);
@@ -255,7 +257,8 @@ TEST(Terms, BoneIsNotPenetrated) {
   EXPECT_EQ(TermCost(NonPenetrationTerm{.min_depth_mm = 3 - 1e-9}, view, view.start), 0);
   EXPECT_NEAR(TermCost(NonPenetrationTerm{.weight = 2, .min_depth_mm = 5}, view, view.start), 8,
               1e-9);
-  // Bone 1 mm above the points: they draw the surface in, the term keeps it 2 mm above the bone.
+  // The bone lies 1 mm above the points. They draw the surface in; the term keeps it 2 mm above the
+  // bone.
   view.start = Sheet(4, 3, 0, 0);
   view.observations = testing::Observe(view.start, 320, 3);
   view.bone.clear();
@@ -274,11 +277,11 @@ TEST(Terms, BoneIsNotPenetrated) {
   EXPECT_NEAR(height(1e4), 3, 1e-3);
 }
 
-TEST(Terms, SpringsRestAtTheirDepthWhicheverWayTheyPoint) {
+TEST(Terms, SpringsRestAtTheirDepthInEveryDirection) {
   LevelView view = NoisyView();
   for (BoneObservation& o : view.bone) {
     const Vec3 point = view.grid.StencilAt(o.point.uv).Apply(view.start);
-    o.foot = point + Vec3(3, 4, 0);  // 5 mm from the surface, and from a point of its own
+    o.foot = point + Vec3(3, 4, 0);  // 5 mm from the surface, and from the point below
     o.point.position = o.foot + Vec3(0, 0, 5);
   }
   EXPECT_NEAR(TermCost(SpringTerm{}, view, view.start), 0, 1e-20);
@@ -291,7 +294,7 @@ TEST(Terms, SpringsRestAtTheirDepthWhicheverWayTheyPoint) {
   EXPECT_LT(TermCost(SpringTerm{.weight = 1}, view, solved.net), 1e-3);
 }
 
-// A flat template that is scaled, sheared or moved; strains by hand.
+// A flat template is scaled, sheared or moved; the expected strains are computed by hand.
 TEST(Terms, DistortionIsGreensStrain) {
   LevelView view = NoisyView();
   for (Vec3& v : view.rest.vertices) {
@@ -314,7 +317,7 @@ TEST(Terms, DistortionIsGreensStrain) {
   EXPECT_NEAR(cost(1.1 * turn, DistortionOf::kArea), std::pow(0.21, 2), 1e-12);
   EXPECT_NEAR(cost(turn * shear, DistortionOf::kArea), 0, 1e-20);
   EXPECT_NEAR(cost(turn * shear, DistortionOf::kMetric), 0.02 + 0.0004, 1e-12);
-  // It keeps the template's lengths where points would stretch it.
+  // The term keeps the template's lengths against points that stretch the surface.
   LevelView stretched = view;
   for (Observation& o : stretched.observations) {
     o.position = 1.2 * view.grid.StencilAt(o.uv).Apply(view.rest);
@@ -329,7 +332,7 @@ TEST(Terms, DistortionIsGreensStrain) {
   EXPECT_LT(strain(100), 0.1 * strain(0));
 }
 
-TEST(Terms, ThatLookAtBoneNeedFeet) {
+TEST(Terms, BoneTermsNeedFeet) {
   LevelView view = NoisyView();
   view.bone.clear();
   for (const Term& term : {Term(SpringTerm{}), Term(NonPenetrationTerm{})}) {

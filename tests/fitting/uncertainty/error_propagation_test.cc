@@ -1,6 +1,4 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "fitting/uncertainty/error_propagation.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,7 +7,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
-#include "fitting/uncertainty/pivoted_root.h"
+#include "fitting/uncertainty/error_propagation.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/adaptive_coverage.h"
@@ -22,8 +20,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// Points of the template on the part with u < 0.7, which may be off along its normals by errors
-// that are correlated.
+// Points of the template in the part u < 0.7, with correlated errors along its normals.
 struct Scene {
   HSplineSurface rest = testing::SmoothSurface({.patches_u = 4, .patches_v = 3, .max_level = 1}, 1);
   FitTarget target;
@@ -78,8 +75,8 @@ struct Scene {
   }
 };
 
-// Points drawn with those errors and fitted, again and again: the surface is off as sigma says.
-TEST(ErrorPropagation, SigmaIsHowFarTheFitIsOffWhereItsPointsAre) {
+// Repeated fits to points with drawn errors deviate from the surface by sigma.
+TEST(ErrorPropagation, SigmaIsTheDeviationOfTheFitWhereThereArePoints) {
   const Scene scene;
   const std::vector<double> sigma =
       scene.Spread(scene.rest, scene.target).Sigma(scene.uv, scene.normals);
@@ -98,7 +95,7 @@ TEST(ErrorPropagation, SigmaIsHowFarTheFitIsOffWhereItsPointsAre) {
   }
 }
 
-TEST(ErrorPropagation, SamplesSpreadAsSigmaSays) {
+TEST(ErrorPropagation, SamplesHaveTheSpreadOfSigma) {
   Scene scene;
   Random random(3);
   const FitTarget off = scene.Off(random);
@@ -120,7 +117,7 @@ TEST(ErrorPropagation, SamplesSpreadAsSigmaSays) {
     EXPECT_NEAR(std::sqrt(squares), sigma[k], 0.1 * sigma[k]) << k;
   }
   EXPECT_EQ(spread.Samples(2, 1)[1].Net(1).vertices, samples[1].Net(1).vertices);
-  // Draws of another random_seed are other draws: their difference has twice the variance.
+  // Draws of another random_seed are independent, so their difference has twice the variance.
   const std::vector<HSplineSurface> others = spread.Samples(kDraws, 2);
   double squares = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
@@ -150,8 +147,8 @@ double GaussMarkovSigma(const HSplineSurface& surface, const FitTarget& target,
   return std::sqrt(row(uv).dot(normal.ldlt().solve(row(uv))));
 }
 
-// Points alone, whose errors are independent and whose weights match them: nothing else can be off.
-TEST(ErrorPropagation, OfIndependentPointsIsGaussAndMarkovs) {
+// The only terms are points with independent errors and matching weights.
+TEST(ErrorPropagation, OfIndependentPointsIsThatOfGaussAndMarkov) {
   const HSplineSurface rest = testing::SmoothSurface({.patches_u = 4, .patches_v = 3}, 1);
   Random random(6);
   FitTarget target;
@@ -175,7 +172,7 @@ TEST(ErrorPropagation, OfIndependentPointsIsGaussAndMarkovs) {
   }
 }
 
-// Neighbours that are off together are not averaged away; those off by themselves are.
+// Errors that neighbours share are not averaged away; independent errors are.
 TEST(ErrorPropagation, CorrelatedErrorsCountInFull) {
   Scene scene;
   scene.uv.pop_back();  // where there are points
@@ -192,9 +189,9 @@ TEST(ErrorPropagation, CorrelatedErrorsCountInFull) {
   }
 }
 
-// The smoothness that draws to the template hides what is not seen: a template that has to be bent
-// more is trusted less where there is no point.
-TEST(ErrorPropagation, WhereThereIsNoPointTheOtherTermsSayHowFar) {
+// Where there is no point, the surface follows the template. If the points bend the template more,
+// sigma is larger there.
+TEST(ErrorPropagation, WithoutPointsTheOtherTermsDetermineSigma) {
   Scene scene;
   scene.errors.root.setZero();
   const auto sigma = [&](double bend_mm) {
@@ -209,7 +206,7 @@ TEST(ErrorPropagation, WhereThereIsNoPointTheOtherTermsSayHowFar) {
   EXPECT_NEAR(much.back(), 5 * little.back(), 0.02 * much.back());
 }
 
-TEST(ErrorPropagation, WhatTheScheduleHasLeftUndoneIsADeviation) {
+TEST(ErrorPropagation, StepsNotTakenCountAsADeviation) {
   Scene scene;
   scene.errors.root.setZero();
   FitTarget shifted = scene.target;
@@ -223,7 +220,7 @@ TEST(ErrorPropagation, WhatTheScheduleHasLeftUndoneIsADeviation) {
   }
 }
 
-TEST(ErrorPropagation, APointThatALossLeavesOutSaysNothing) {
+TEST(ErrorPropagation, APointWithoutPullHasNoEffect) {
   Scene scene;
   scene.terms[0] = PointTerm{};
   const std::vector<double> without =
@@ -245,9 +242,8 @@ TEST(ErrorPropagation, APointThatALossLeavesOutSaysNothing) {
   }
 }
 
-// Finer vertices in places: draws of the points' noise fitted on the same vertices, again and
-// again.
-TEST(ErrorPropagation, OfAnAdaptiveFitItIsHowFarItsNoiseTakesIt) {
+// Repeated fits to drawn noise on the same vertices, some of them finer.
+TEST(ErrorPropagation, OfAnAdaptiveFitIsTheDeviationByItsNoise) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 2};
   constexpr double kNoise_mm = 0.01;
   constexpr int kCount = 800;
@@ -294,16 +290,17 @@ TEST(ErrorPropagation, OfAnAdaptiveFitItIsHowFarItsNoiseTakesIt) {
   }
 }
 
-// With a tolerance as small as the noise the vertices are enough, and only the noise is left; with
-// several times as much, what the vertices cannot follow is in no interval.
-TEST(ErrorPropagation, IntervalsOfAnAdaptiveFitHoldWhereItsToleranceIsTheNoise) {
+// With a tolerance as small as the noise there are enough vertices, and only the noise is left.
+// With a tolerance several times as large, the intervals do not cover the detail that the vertices
+// cannot follow.
+TEST(ErrorPropagation, IntervalsOfAnAdaptiveFitHoldForAToleranceOfTheNoise) {
   const double fine = testing::AdaptiveCoverage(1, 16), coarse = testing::AdaptiveCoverage(5, 4);
   EXPECT_GT(fine, 0.88);
   EXPECT_LT(fine, 0.92);
   EXPECT_LT(coarse, fine);
 }
 
-TEST(ErrorPropagation, WhereNothingIsSaidThereIsNoNumber) {
+TEST(ErrorPropagation, IsNaNWhereNothingDeterminesTheSurface) {
   Scene scene;
   scene.terms = {PointTerm{}};
   const std::vector<double> sigma =
@@ -337,7 +334,7 @@ TEST(ErrorPropagation, WrongInputIsNamed) {
   EXPECT_THAT(message(), HasSubstr("89 directions"));
 }
 
-TEST(PivotedRoot, GivesTheMatrixBackToItsShare) {
+TEST(PivotedRoot, ReproducesTheMatrixToItsShare) {
   Eigen::MatrixXd covariance(60, 60);
   for (int i = 0; i < 60; ++i) {
     for (int j = 0; j < 60; ++j) {
