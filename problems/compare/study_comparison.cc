@@ -46,7 +46,7 @@ std::vector<std::string> NamesOf(const std::vector<fs::path>& folders) {
 std::set<std::string> SubjectsOf(const NamedStudy& study, const std::string& metric) {
   std::set<std::string> subjects;
   for (const TrialRow& row : study.results.trials) {
-    if (row.status == "done" && !row.aside && row.metrics.contains(metric)) {
+    if (row.status == "done" && row.metrics.contains(metric)) {
       subjects.insert(row.subject);
     }
   }

@@ -19,7 +19,6 @@
 #include "problems/output/staged_folder.h"
 #include "problems/study/study_run.h"
 #include "problems/study/study_submit.h"
-#include "problems/study_report/search_report.h"
 #include "problems/study_report/study_ranking.h"
 #include "problems/study_report/study_report.h"
 
@@ -52,12 +51,6 @@ int PrintPlan(const StudyPlan& plan, const std::string& only) {
   if (!only.empty()) {
     Tell("of these {} where {}\n", std::ranges::count(chosen, true), only);
   }
-  if (plan.search) {
-    Tell(
-        "then a search: treatments for {} full runs, each on {} subjects; which they are depends "
-        "on what those before gave\n",
-        plan.search->options.budget, plan.search->subjects.size());
-  }
   return kDone;
 }
 
@@ -79,9 +72,6 @@ int PrintStudyState(const StudyResults& results, const fs::path& root) {
     }
   }
   Tell("{}", RankingText(results));
-  if (const auto search = ReadSearchResults(root, results)) {
-    Tell("{}", SearchText(results, *search));
-  }
   Tell("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
        results.trials.size(), results.Count("unusable"), results.Count("failed"),
        results.Count("missing"));
@@ -156,11 +146,6 @@ void TellShard(const StudySummary& summary, const StudyRunOptions& options) {
       "shard {} of {}: {} trials, {} already there, {} done, {} failed; gather with semblance "
       "merge\n",
       options.shard, options.shards, summary.trials, summary.skipped, summary.done, summary.failed);
-  if (summary.waits) {
-    fmt::print(
-        "the search waits for the other shards of this generation; when theirs are in the "
-        "folder, call every shard again for the next\n");
-  }
 }
 
 int StudyCommand(const StudyArguments& a) {
@@ -240,12 +225,7 @@ int SubmitCommand(const StudyArguments& a) {
   options.program = fs::read_symlink("/proc/self/exe");
   options.study = a.files.at(0);
   options.folder = a.out.empty() ? "out/" + options.study.stem().string() : a.out;
-  if (ReadStudy(options.study).search) {  // its faults are said here, not by every node
-    throw InputError(fmt::format(
-        "{}: a search goes on from what it has found, so an array of jobs cannot do it; submit "
-        "`semblance study` with --jobs as one job",
-        options.study.string()));
-  }
+  ReadStudy(options.study);  // reports its faults here rather than on every node
   fmt::print("{}", SubmitScript(options));
   std::fflush(stdout);
   SubmitStudy(options);

@@ -11,7 +11,6 @@
 //     zip: {fit.features: [restore, free], title: [a, b]}              # side by side
 //     list: [{seeds.level: 1}, {seeds.level: 2, rounds: 2}]            # by hand
 //     sample: {method: lhs, n: 20, random_seed: 1, ranges: {seeds.weight: [0.1, 1.0]}}
-//     search: {method: bayes, budget: 30, ranges: {seeds.weight: {low: 0.1, high: 1.0}}}
 //     tags: [paper, 2026]              # words that people find it by
 //     metric: face.rms_mm              # that the report ranks by
 //     keep: summary
@@ -19,8 +18,7 @@
 //     identify: {others: [{name: c, set: {subject.random_seed: 3}}]}   # for job: identify
 //
 // Each of grid, zip, list and sample gives rows; a trial is a subject with one row of each. A value
-// is any part of an experiment, be it a number or a whole strategy. A search, instead of them,
-// finds its rows as it goes: which is next depends on what those before gave.
+// is any part of an experiment, be it a number or a whole strategy.
 #pragma once
 
 #include <array>
@@ -33,8 +31,6 @@
 
 #include "problems/config/config_errors.h"
 #include "problems/config/config_tree.h"
-#include "problems/search/search_method.h"
-#include "problems/search/unit_samples.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {
@@ -105,6 +101,11 @@ void Fields(Visitor& visit, IdentifyOptions& o) {
   visit(FieldInfo{.name = "random_seed", .doc = "of the ceiling's noise"}, o.random_seed);
 }
 
+// lhs: one point in each of n equal slices of each axis (McKay et al. 1979); sobol: the first n
+// points of the sequence after its origin.
+enum class SampleMethod { kLhs, kSobol };
+constexpr auto EnumNames(SampleMethod) { return std::to_array<std::string_view>({"lhs", "sobol"}); }
+
 struct StudySamples {
   SampleMethod method = SampleMethod::kLhs;  // covers each axis evenly whatever n is; sobol is best
                                              // for powers of two
@@ -135,90 +136,6 @@ void CheckValue(Report& report, const StudySamples& o) {
   }
 }
 
-// Which values of a metric a search is for: those at an end, or those nearest to what it should be.
-enum class Better { kLower, kHigher, kNearest };
-constexpr auto EnumNames(Better) {
-  return std::to_array<std::string_view>({"lower", "higher", "nearest"});
-}
-
-struct SearchedNumber {
-  ConfigNode low, high;  // as they are written, because 1 and 5 ask for whole numbers and 1.0 not
-  bool log = false;      // spread by the logarithm
-};
-template <class Visitor>
-void Fields(Visitor& visit, SearchedNumber& o) {
-  visit(FieldInfo{.name = "low",
-                  .doc = "lowest number; where both ends are written without a point, only whole "
-                         "numbers are tried"},
-        o.low);
-  visit(FieldInfo{.name = "high", .doc = "highest number"}, o.high);
-  visit(FieldInfo{.name = "log",
-                  .doc = "spread by the logarithm, for what counts by its factor, as weights and "
-                         "tolerances do; both ends must be above 0"},
-        o.log);
-}
-
-struct StudySearch {
-  SearchMethod method = BayesSearch{};  // the least runs where a treatment costs minutes
-  int budget = 0;                       // must be given
-  std::uint64_t random_seed = 1;        // of whatever the method draws
-  std::string metric;                   // empty: the study's
-  std::optional<Better> better;         // none: as the metric says of itself
-  ConfigMap<SearchedNumber> ranges;     // numbers, by option path
-  OptionAxes choices;                   // values without an order, by option path
-  std::vector<StudySubject> held_out;   // empty: what is found is as good as it looks to itself
-};
-template <class Visitor>
-void Fields(Visitor& visit, StudySearch& o) {
-  visit(FieldInfo{.name = "method",
-                  .doc = "bayes: a Gaussian process, for few and costly treatments; cmaes: a cloud "
-                         "that moves, for a hundred or more over numbers; halving: many short "
-                         "runs, the best of them longer; random: what a search must beat"},
-        o.method);
-  visit(FieldInfo{.name = "budget",
-                  .min = 1,
-                  .max = 100000,
-                  .doc = "treatments to try, each on all subjects; short runs of halving count by "
-                         "their length; must be given"},
-        o.budget);
-  visit(FieldInfo{.name = "random_seed", .doc = "of whatever the method draws"}, o.random_seed);
-  visit(FieldInfo{.name = "metric",
-                  .doc = "a number of result.json by its path, whose mean over subjects is "
-                         "searched; the report ranks by it; left out, the study's metric"},
-        o.metric);
-  visit(
-      FieldInfo{.name = "better",
-                .doc = "which values of the metric are better; left out, higher for shares within "
-                       "a distance, as face.within_2_5mm, nearest to 0 for signed errors, nearest "
-                       "to the stated share for coverage_50, _90 and _95, and lower for all "
-                       "others"},
-      o.better);
-  visit(FieldInfo{.name = "ranges",
-                  .doc = "numbers by option path, as in {seeds.weight: {low: 0.1, high: 10.0, log: "
-                         "true}}"},
-        o.ranges);
-  visit(FieldInfo{.name = "choices",
-                  .min = 2,
-                  .doc = "by option path, values without an order: words, or whole strategies"},
-        o.choices);
-  visit(FieldInfo{.name = "held_out",
-                  .doc = "subjects that the search never sees; at its end the best treatment and "
-                         "the base, as it stands, are run on them and compared: name, base, set "
-                         "and optional as of a subject"},
-        o.held_out);
-}
-template <class Report>
-void CheckValue(Report& report, const StudySearch& o) {
-  if (o.budget == 0) {
-    report("budget", "the number of treatments is missing; write it as in budget: 30");
-  }
-  if (o.ranges.entries.empty() && o.choices.entries.empty()) {
-    report("ranges",
-           "there is nothing to search; give ranges or choices, as in {seeds.weight: {low: 0.1, "
-           "high: 1.0}}");
-  }
-}
-
 struct StudyFile {
   std::string title = "untitled";  // of the report
   std::filesystem::path base;  // must be given: a study varies an experiment that runs by itself
@@ -228,7 +145,6 @@ struct StudyFile {
   OptionAxes zip;                           // values side by side
   std::vector<OptionValues> list;           // rows by hand
   std::optional<StudySamples> sample;       // rows drawn from ranges
-  std::optional<StudySearch> search;        // instead of grid, zip, list and sample
   std::vector<std::string> tags;            // that it is found by
   std::string metric = "face.rms_mm";       // that the report ranks by
   TrialFiles keep = TrialFiles::kSummary;   // the files of a run are some 30 MB, of a summary 10 kB
@@ -254,10 +170,6 @@ void Fields(Visitor& visit, StudyFile& o) {
         o.zip);
   visit(FieldInfo{.name = "list", .min = 1, .doc = "rows by hand: values by option path"}, o.list);
   visit(FieldInfo{.name = "sample", .doc = "rows of numbers drawn from ranges"}, o.sample);
-  visit(FieldInfo{.name = "search",
-                  .doc = "instead of grid, zip, list and sample: treatments that are chosen by "
-                         "what those before gave, to find the best"},
-        o.search);
   visit(FieldInfo{.name = "tags",
                   .doc = "words of one's own that the study is found by; they stand in its report "
                          "and in results.sqlite"},
@@ -281,15 +193,6 @@ template <class Report>
 void CheckValue(Report& report, const StudyFile& o) {
   if (o.identify && o.job != StudyJob::kIdentify) {
     report("identify", "is for a study of that job only; set job: identify, or take it out");
-  }
-  const bool has_rows =
-      !o.grid.entries.empty() || !o.zip.entries.empty() || !o.list.empty() || o.sample.has_value();
-  if (o.search && has_rows) {
-    report("search",
-           "chooses the treatments itself; take out grid, zip, list and sample, or the search");
-  }
-  if (o.search && o.job == StudyJob::kIdentify && !o.search->held_out.empty()) {
-    report("search", "held_out: job: identify has one gallery for all; take held_out out");
   }
 }
 

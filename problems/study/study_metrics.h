@@ -2,9 +2,11 @@
 // The numbers that a trial can have, known before any has run.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "problems/study/study_file.h"
 
@@ -20,6 +22,11 @@ std::string ComplaintAboutMetric(const std::string& metric, StudyJob job);
 // Whether the metric measures against the true skin, so that a subject without one has no such
 // number.
 bool NeedsTrueSkin(const std::string& metric);
+
+enum class Better { kLower, kHigher, kNearest };
+constexpr auto EnumNames(Better) {
+  return std::to_array<std::string_view>({"lower", "higher", "nearest"});
+}
 
 // Which of its values are better: higher of shares within a distance, as face.within_2_5mm; nearest
 // to 0 of signed errors (mean_signed_mm, bias_mm, a site's when it was left out), to the share that
@@ -41,7 +48,7 @@ struct Preference {
   std::string OfWhat() const;  // behind the metric: ", distance from 0.9"; "" of the others
 };
 
-// said: by the study or the user; then the target is still the metric's own, 0 of most.
+// said: by the user; then the target is still the metric's own, 0 of most.
 Preference PreferenceFor(const std::string& metric, std::optional<Better> said = std::nullopt);
 
 }  // namespace semblance

@@ -30,23 +30,19 @@ class SubjectReader {
       : study_(study), tree_(tree), defaults_(defaults), errors_(errors) {}
 
   struct All {
-    std::vector<SubjectTree> subjects, others, held_out;
+    std::vector<SubjectTree> subjects, others;
   };
 
   All Read() const {
     const ConfigNode base = ReadBase();
-    All all{.subjects = ReadList(study_.subjects, "subjects", base), .others = {}, .held_out = {}};
+    All all{.subjects = ReadList(study_.subjects, "subjects", base), .others = {}};
     if (study_.subjects.empty()) {
       all.subjects.push_back({"base", base});
       Apply(study_.set, all.subjects.back().tree);
     }
     if (study_.identify) {
       all.others = ReadList(study_.identify->others, "identify.others", base);
-      RequireOtherNames(all.subjects, all.others, "identify.others");
-    }
-    if (study_.search) {
-      all.held_out = ReadList(study_.search->held_out, "search.held_out", base);
-      RequireOtherNames(all.subjects, all.held_out, "search.held_out");
+      RequireOtherNames(all.subjects, all.others);
     }
     return all;
   }
@@ -70,11 +66,10 @@ class SubjectReader {
   }
 
   void RequireOtherNames(const std::vector<SubjectTree>& subjects,
-                         const std::vector<SubjectTree>& others,
-                         const std::string& list_path) const {
+                         const std::vector<SubjectTree>& others) const {
     for (std::size_t n = 0; n < others.size(); ++n) {
       if (std::ranges::find(subjects, others[n].name, &SubjectTree::name) != subjects.end()) {
-        Fail(JoinPath(list_path, n),
+        Fail(JoinPath("identify.others", n),
              fmt::format("'{}' is one of the subjects already; take one out", others[n].name));
       }
     }
@@ -182,11 +177,6 @@ void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
     }
   }
   ids += plan.common;
-  if (plan.search) {
-    StudySearch how = plan.search->options;
-    how.held_out.clear();  // their experiments are among the ids
-    ids += WriteConfig(how);
-  }
   plan.hash = Sha256OfText(ids).substr(0, ExperimentHash::kIdDigits);
 }
 
@@ -226,62 +216,11 @@ void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& pl
   }
 }
 
-bool SearchHasMetric(const StudyFile& study) {
-  return study.search && !study.search->metric.empty();
-}
-
-std::string MetricOf(const StudyFile& study) {
-  return SearchHasMetric(study) ? study.search->metric : study.metric;
-}
-
 void CheckMetric(const StudyFile& study, const ConfigNode& tree, ConfigErrors& errors) {
-  const char* const path = SearchHasMetric(study) ? "search.metric" : "metric";
-  if (const std::string complaint = ComplaintAboutMetric(MetricOf(study), study.job);
+  if (const std::string complaint = ComplaintAboutMetric(study.metric, study.job);
       !complaint.empty()) {
-    errors.Add(LocationOf(tree, path), path, complaint);
+    errors.Add(LocationOf(tree, "metric"), "metric", complaint);
   }
-  if (SearchHasMetric(study) && tree.Find("metric") && study.metric != study.search->metric) {
-    errors.Add(
-        LocationOf(tree, path), path,
-        fmt::format("the study's metric is '{}'; a study has one: take one out", study.metric));
-  }
-}
-
-// The subjects of which the plan has trials.
-std::vector<SubjectTree> LeftOf(const std::vector<SubjectTree>& subjects, const StudyPlan& plan) {
-  std::vector<SubjectTree> left;
-  std::ranges::copy_if(subjects, std::back_inserter(left), [&](const SubjectTree& subject) {
-    return std::ranges::find(plan.trials, subject.name, &StudyTrial::subject) != plan.trials.end();
-  });
-  return left;
-}
-
-// The base as it stands, on all subjects; and whether what the search can make of it can be read.
-void AddSearch(const fs::path& file, SearchPlan search, const std::vector<SubjectTree>& subjects,
-               const std::vector<SubjectTree>& held_out, StudyPlan& plan, TrialFaults& faults) {
-  const std::vector<StudyRow> base(1);
-  for (const SubjectTree& subject : subjects) {
-    AddTrials(file, subject, base, search.defaults, plan, faults);
-  }
-  const std::size_t first_held_out = plan.trials.size();
-  for (const SubjectTree& subject : held_out) {
-    AddTrials(file, subject, base, search.defaults, plan, faults);
-  }
-  for (std::size_t n = first_held_out; n < plan.trials.size(); ++n) {
-    plan.trials[n].aside = true;
-  }
-  search.subjects = LeftOf(subjects, plan);
-  search.held_out = LeftOf(held_out, plan);
-  if (!search.subjects.empty()) {
-    StudyPlan unused{.axes = plan.axes};
-    AddTrials(file, search.subjects[0], RowsToCheck(search), search.defaults, unused, faults);
-    if (const std::string complaint =
-            ComplaintAboutShortRuns(search, plan.job, plan.trials[0].experiment);
-        !complaint.empty()) {
-      faults.Add(fmt::format("{}: search.method: {}", file.string(), complaint));
-    }
-  }
-  plan.search = std::make_shared<const SearchPlan>(std::move(search));
 }
 
 bool HasSkin(const StudyTrial& trial) {
@@ -314,18 +253,13 @@ void AddGallery(const fs::path& file, std::initializer_list<const std::vector<Su
   }
 }
 
-// Whether someone is left to try on; those held out of a search are not.
-bool NoSubjectIsLeft(const StudyPlan& plan) {
-  return plan.search ? plan.search->subjects.empty() : plan.trials.empty();
-}
-
 // Whether someone is left, with what the metric needs.
 void CheckSubjects(const fs::path& file, const ConfigNode& tree, WithoutSubjects without_subjects,
                    StudyPlan& plan, TrialFaults& faults) {
   constexpr const char* kNone = "no subject is left; all are optional and lack files";
-  if (NoSubjectIsLeft(plan) && without_subjects == WithoutSubjects::kNote) {
+  if (plan.trials.empty() && without_subjects == WithoutSubjects::kNote) {
     plan.notes.emplace_back(kNone);
-  } else if (NoSubjectIsLeft(plan)) {
+  } else if (plan.trials.empty()) {
     faults.Add(fmt::format("{}: {}", file.string(), kNone));
   } else if (NeedsTrueSkin(plan.metric) && NoneHasSkin(plan)) {
     faults.Add(fmt::format(
@@ -348,7 +282,7 @@ StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& er
 // Without axes and trials.
 StudyPlan EmptyPlan(const StudyFile& study) {
   StudyPlan plan{
-      .title = study.title, .metric = MetricOf(study), .keep = study.keep, .job = study.job};
+      .title = study.title, .metric = study.metric, .keep = study.keep, .job = study.job};
   plan.tags = study.tags;
   return plan;
 }
@@ -363,27 +297,18 @@ StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects) {
   CheckMetric(study, tree, errors);
   TrialFaults faults;
   ConfigErrors of_bases;
-  const auto [subjects, others, held_out] = SubjectReader(study, tree, defaults, of_bases).Read();
+  const auto [subjects, others] = SubjectReader(study, tree, defaults, of_bases).Read();
   const std::vector<StudyRow> rows = StudyRows(study, errors);
-  SearchPlan search;
-  if (study.search) {
-    search = MakeSearchPlan(*study.search, tree, errors);
-    search.defaults = defaults;
-  }
   faults.Add(errors);
   faults.Add(of_bases);
-  if (of_bases.size() > 0 || (study.search && errors.size() > 0)) {
-    faults.ThrowIfAny();  // the trials would repeat what is wrong with their base and axes
+  if (of_bases.size() > 0) {
+    faults.ThrowIfAny();  // the trials would repeat what is wrong with their base
   }
 
   StudyPlan plan = EmptyPlan(study);
-  plan.axes = study.search ? search.axes : AxesOf(rows);
-  if (study.search) {
-    AddSearch(file, std::move(search), subjects, held_out, plan, faults);
-  } else {
-    for (const SubjectTree& subject : subjects) {
-      AddTrials(file, subject, rows, defaults, plan, faults);
-    }
+  plan.axes = AxesOf(rows);
+  for (const SubjectTree& subject : subjects) {
+    AddTrials(file, subject, rows, defaults, plan, faults);
   }
   if (study.job == StudyJob::kIdentify) {
     plan.identify = study.identify.value_or(IdentifyOptions{});

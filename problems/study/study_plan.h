@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // A study (study_file.h) as a plan: the table of its trials. It is expanded and checked as a whole
-// before anything runs; of a search, whatever its axes can make of the base is checked.
+// before anything runs.
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "problems/study/search_plan.h"
 #include "problems/study/study_trial.h"
 
 namespace semblance {
@@ -17,15 +15,6 @@ namespace semblance {
 struct GalleryEntry {
   std::string name;
   Experiment experiment;
-};
-
-// A treatment that a search asked for.
-struct SearchStep {
-  int generation = 0;
-  double cost = 1;                  // in full runs
-  std::vector<std::string> values;  // one per axis
-  std::vector<std::string> trials;  // ids: one per subject; another step's, or the base's, where it
-                                    // is the same experiment
 };
 
 struct StudyPlan {
@@ -41,13 +30,6 @@ struct StudyPlan {
   IdentifyOptions identify = {};           // of that job
   std::vector<GalleryEntry> gallery = {};  // the subjects that are left, then the others
   std::string common = {};                 // what the ids of all trials hold (TrialId)
-
-  // Of a study that searches. Its `trials` are those of the base as it stands, on all subjects and
-  // on those held out; a run adds the others as it goes (search_run.h), and their steps.
-  std::shared_ptr<const SearchPlan> search = nullptr;
-  std::vector<SearchStep> steps = {};
-  int best_step = -1;         // once the search has ended; -1: none had a value
-  bool search_ended = false;  // its budget is spent
 };
 
 // Where all subjects are optional and lack files: a fault, or a note, for who only looks whether
@@ -56,8 +38,7 @@ enum class WithoutSubjects { kFault, kNote };
 
 // Throws IoError if the file cannot be read; ConfigError with all faults, each once and at its
 // line: those of the file, of every trial's experiment, a metric that no trial can have, and trials
-// that are the same experiment. Without subjects (kNote) the plan has no trials but those on the
-// subjects held out of a search.
+// that are the same experiment. Without subjects (kNote) the plan has no trials.
 StudyPlan ReadStudy(const std::filesystem::path& file,
                     WithoutSubjects without_subjects = WithoutSubjects::kFault);
 

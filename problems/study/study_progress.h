@@ -15,11 +15,9 @@ namespace semblance {
 struct StudyEta {
   int trials = 0, finished = 0, finished_before = 0, failed = 0;
   double elapsed_s = 0;
-  int later = 0;  // trials that a search has not asked for yet, about
 };
 
-// "12 of 80 trials, 4.6 s each, about 5 min left; 1 failed", without what is not known yet. Of a
-// search "12 of about 80 trials".
+// "12 of 80 trials, 4.6 s each, about 5 min left; 1 failed", without what is not known yet.
 std::string EtaText(const StudyEta& eta);
 
 // "[######......]", `width` characters between the brackets.

@@ -3,15 +3,16 @@
 
 #include <fmt/format.h>
 
+#include <boost/random/sobol.hpp>
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <string>
 
 #include "problems/config/config_reader.h"
-#include "problems/search/unit_samples.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/fields.h"
+#include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
@@ -90,6 +91,42 @@ std::optional<SampleRange> ReadRange(const std::string& path, const ConfigLocati
   return errors.size() == before ? std::optional(range) : std::nullopt;
 }
 
+std::vector<std::vector<double>> SobolPoints(int n, int dimensions) {
+  boost::random::sobol engine(dimensions);
+  std::vector<std::vector<double>> points(n, std::vector<double>(dimensions));
+  for (auto& point : points) {
+    for (double& x : point) {
+      x = static_cast<double>(engine() >> 11) * 0x1.0p-53;  // of 64 bits, as many as fit
+    }
+  }
+  return points;
+}
+
+std::vector<std::vector<double>> LatinHypercube(int n, int dimensions, std::uint64_t random_seed) {
+  Random random(random_seed);
+  std::vector<std::vector<double>> points(n, std::vector<double>(dimensions));
+  for (int d = 0; d < dimensions; ++d) {
+    std::vector<int> slice(n);
+    for (int k = 0; k < n; ++k) {
+      const int other = static_cast<int>(random.Uniform() * (k + 1));
+      slice[k] = slice[other];
+      slice[other] = k;
+    }
+    for (int k = 0; k < n; ++k) {
+      points[k][d] = (slice[k] + random.Uniform()) / n;
+    }
+  }
+  return points;
+}
+
+// samples.n points of the unit cube, which has one dimension for each range.
+std::vector<std::vector<double>> UnitSamples(const StudySamples& samples) {
+  const int dimensions = static_cast<int>(samples.ranges.entries.size());
+  return samples.method == SampleMethod::kSobol
+             ? SobolPoints(samples.n, dimensions)
+             : LatinHypercube(samples.n, dimensions, samples.random_seed);
+}
+
 std::string SampleText(const SampleRange& range, double unit) {
   if (range.whole) {
     const double count = range.high - range.low + 1;
@@ -104,8 +141,7 @@ std::vector<StudyRow> SampleRows(const std::optional<StudySamples>& samples, Con
   }
   const auto& axes = samples->ranges.entries;
   std::vector<StudyRow> rows(static_cast<std::size_t>(samples->n));
-  const auto points =
-      UnitSamples(samples->method, samples->n, static_cast<int>(axes.size()), samples->random_seed);
+  const auto points = UnitSamples(*samples);
   for (std::size_t k = 0; k < axes.size(); ++k) {
     const auto range = ReadRange(JoinPath("sample.ranges", axes[k].key), axes[k].key_location,
                                  axes[k].value, errors);
@@ -139,7 +175,7 @@ std::string ComplaintAboutSize(const StudyFile& study) {
              ? ""
              : fmt::format(
                    "subjects, grid, zip, list and sample make {:.6g} trials; a study has at most "
-                   "{:.0f}: take values out, or draw some with sample or search",
+                   "{:.0f}: take values out, or draw some with sample",
                    count, kMostTrials);
 }
 

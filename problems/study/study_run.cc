@@ -26,7 +26,6 @@
 #include "problems/report/timing_json.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/identify_study.h"
-#include "problems/study/search_run.h"
 #include "problems/study/study_metrics.h"
 #include "problems/study/study_tables.h"
 #include "problems/study/trial_folder.h"
@@ -86,25 +85,6 @@ std::shared_ptr<const DiskCache> CacheOnDisk(const StudyRunOptions& options) {
              : std::make_shared<const DiskCache>(options.cache, kMegabyte * options.cache_limit_mb);
 }
 
-// How many trials a search will still ask for, about: what is left of its budget, at as many trials
-// for a full run as it has taken so far, and the best on the subjects held out.
-int StillToAsk(const StudyPlan& plan) {
-  if (!plan.search || plan.search_ended) {
-    return 0;
-  }
-  double spent = 0, trials = 0;
-  for (const SearchStep& step : plan.steps) {
-    spent += step.cost;
-    trials += static_cast<double>(step.trials.size());
-  }
-  const double subjects = static_cast<double>(plan.search->subjects.size());
-  const double left = std::max(0.0, plan.search->options.budget - spent);
-  const auto aside = std::ranges::count_if(plan.trials, &StudyTrial::aside);
-  const auto held_out = 2 * static_cast<std::ptrdiff_t>(plan.search->held_out.size()) - aside;
-  return static_cast<int>(std::lround(left * (spent > 0 ? trials / spent : subjects))) +
-         static_cast<int>(std::max<std::ptrdiff_t>(0, held_out));
-}
-
 class StudyRunner {
  public:
   StudyRunner(const StudyPlan& plan, fs::path folder, const StudyRunOptions& options,
@@ -115,13 +95,10 @@ class StudyRunner {
         context_(context),
         cache_(4 * options.jobs + 6, CacheOnDisk(options)) {}
 
-  // The trials of this shard from `first` on, those before having been run.
-  void Run(std::size_t first) {
+  // The trials of this shard.
+  void Run() {
     const std::vector<bool> chosen = TrialsThat(plan_, options_.only);
-    queue_.clear();
-    next_ = ended_ = 0;
-    later_ = StillToAsk(plan_) / options_.shards;
-    for (std::size_t n = first; n < plan_.trials.size(); ++n) {
+    for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
       if (static_cast<int>(n % options_.shards) == options_.shard && chosen[n]) {
         Queue(plan_.trials[n]);
       }
@@ -151,12 +128,6 @@ class StudyRunner {
     summary_.shared_made = cache_.made();
   }
   const StudySummary& summary() const { return summary_; }
-
-  // Nothing more is asked for.
-  void TellTheEnd() {
-    later_ = 0;
-    TellProgress("");
-  }
 
  private:
   void Queue(const StudyTrial& trial) {
@@ -361,8 +332,7 @@ class StudyRunner {
                             .finished = summary_.done + summary_.failed + summary_.skipped,
                             .finished_before = summary_.skipped,
                             .failed = summary_.failed,
-                            .elapsed_s = elapsed_s,
-                            .later = later_},
+                            .elapsed_s = elapsed_s},
                            trial);
     }
   }
@@ -381,30 +351,9 @@ class StudyRunner {
   std::mutex mutex_;
   std::condition_variable thread_ended_;
   std::size_t ended_ = 0;  // of the threads
-  int later_ = 0;          // trials that this shard will still be asked for, about
   std::exception_ptr broken_;
   StudySummary summary_;
 };
-
-// A search as plan.json has it: how it goes, and what it has asked for so far.
-Json SearchJson(const StudyPlan& plan) {
-  const StudySearch& search = plan.search->options;
-  const Better better = search.better.value_or(BetterOf(plan.metric));
-  Json json = {{"method", ToFlowYaml(ConfigTreeOf(search.method))},
-               {"budget", search.budget},
-               {"random_seed", search.random_seed},
-               {"better", EnumNames(better)[static_cast<std::size_t>(better)]},
-               {"ended", plan.search_ended},
-               {"best", plan.best_step},
-               {"steps", Json::array()}};
-  for (const SearchStep& step : plan.steps) {
-    json["steps"].push_back({{"generation", step.generation},
-                             {"cost", step.cost},
-                             {"values", step.values},
-                             {"trials", step.trials}});
-  }
-  return json;
-}
 
 // plan.json as text.
 std::string PlanJson(const StudyPlan& plan) {
@@ -414,12 +363,6 @@ std::string PlanJson(const StudyPlan& plan) {
   for (const StudyTrial& trial : plan.trials) {
     json["trials"].push_back(
         {{"id", trial.id}, {"subject", trial.subject}, {"values", trial.values}});
-    if (trial.aside) {
-      json["trials"].back()["aside"] = true;
-    }
-  }
-  if (plan.search) {
-    json["search"] = SearchJson(plan);
   }
   return json.dump(1) + "\n";
 }
@@ -446,11 +389,6 @@ bool IsChanged(const PlanThere& there, const StudyPlan& plan, const fs::path& fo
   return changed;
 }
 
-bool IsAnyMissing(const StudyPlan& plan, std::size_t first, const fs::path& folder) {
-  return std::any_of(plan.trials.begin() + static_cast<std::ptrdiff_t>(first), plan.trials.end(),
-                     [&](const StudyTrial& trial) { return !StatusOf(folder, trial.id); });
-}
-
 // All that can be wrong with the plans, before anything is written.
 void RequirePlanOf(const fs::path& folder, const std::vector<fs::path>& others) {
   std::string hash = PlanHashOf(folder);
@@ -465,46 +403,21 @@ void RequirePlanOf(const fs::path& folder, const std::vector<fs::path>& others) 
   }
 }
 
-// Of two shards of a search, one may have come further.
-bool HasMoreTrials(const fs::path& folder, const fs::path& other) {
-  return ReadPlanThere(folder).ids.size() > ReadPlanThere(other).ids.size();
-}
-
 }  // namespace
 
 StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
                       const RunContext& context) {
-  if (plan.search && !options.only.empty()) {
-    throw InputError(fmt::format(
-        "--only {}: a search decides itself which trials are run; take it out", options.only));
-  }
   TrialsThat(plan, options.only);  // what is wrong with it is said before anything is written,
   CacheOnDisk(options);            // and so is what is wrong with the cache
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
   const PlanThere there = ReadPlanThere(folder);
   const bool changed = IsChanged(there, plan, folder);
-  StudyPlan grown = plan;
-  StudyRunner runner(grown, folder, options, context);
-  bool ended = true;
-  if (plan.search) {
-    ended = RunSearch(grown, folder, [&](std::size_t first) {
-      if (IsAnyMissing(grown, first, folder)) {
-        output.Write("plan.json", PlanJson(grown));
-      }
-      runner.Run(first);
-    });
-    if (ended) {
-      runner.TellTheEnd();
-    }
-  }
-  output.Write("plan.json", PlanJson(grown));
-  if (!plan.search) {
-    runner.Run(0);
-  }
+  StudyRunner runner(plan, folder, options, context);
+  output.Write("plan.json", PlanJson(plan));
+  runner.Run();
   StudySummary summary = runner.summary();
-  summary.waits = !ended;
   summary.changed = changed;
-  summary.left_over = CountLeftOver(there, grown);
+  summary.left_over = CountLeftOver(there, plan);
   return summary;
 }
 
@@ -513,9 +426,7 @@ std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<
   std::vector<std::string> not_taken;
   for (const fs::path& other : others) {
     OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
-    if (!HasMoreTrials(folder, other)) {
-      output.Write("plan.json", ReadFileBytes(other / "plan.json"));
-    }
+    output.Write("plan.json", ReadFileBytes(other / "plan.json"));
     if (!fs::exists(other / "trials")) {
       continue;
     }

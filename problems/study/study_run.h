@@ -36,7 +36,6 @@ struct StudySummary {
   int done = 0, failed = 0;
   int left_over = 0;     // trials of an earlier plan in this folder that are none of this one
   bool changed = false;  // the folder held an earlier plan
-  bool waits = false;    // a search: trials of this generation are other shards' and not there yet
   int shared_made = 0;  // subjects, shells, skulls with their implicit face, and generic faces that
                         // were made; each serves all trials that have it in common
 };
@@ -51,7 +50,7 @@ struct StudySummary {
 // (its trial.json then lists the axes of the changed study), unless it lacks the files that `keep`
 // asks for now; one that is no longer in the plan stays where it is and is in no table. Throws
 // IoError if the folder cannot be written or holds a plan that shares no trial with this one,
-// InputError as TrialsThat or for a part of a search, Cancelled on request (after the trials at
+// InputError as TrialsThat, Cancelled on request (after the trials at
 // hand).
 StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
                       const StudyRunOptions& options, const RunContext& context);

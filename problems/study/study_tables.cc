@@ -120,22 +120,12 @@ std::string AreaMetricOf(const StudyResults& results) {
   return "";
 }
 
-// What a search was told; none where the metric says it itself.
-std::optional<Better> SaidBetter(const Json& plan) {
-  if (!plan.contains("search")) {
-    return std::nullopt;
-  }
-  const std::string said = plan["search"].at("better");
-  return said == "higher" ? Better::kHigher : said == "nearest" ? Better::kNearest : Better::kLower;
-}
-
 // Of the plan; its figures are read later.
 TrialRow RowOf(const Json& trial) {
   TrialRow row;
   row.id = trial.at("id");
   row.subject = trial.at("subject");
   row.values = trial.at("values").get<std::vector<std::string>>();
-  row.aside = trial.value("aside", false);
   return row;
 }
 
@@ -176,7 +166,7 @@ StudyResults ReadStudyResults(const fs::path& folder) {
     }
     ReadTrials(folder, results.trials);
     results.tags = plan.value("tags", std::vector<std::string>());
-    results.preference = PreferenceFor(results.metric, SaidBetter(plan));
+    results.preference = PreferenceFor(results.metric);
   } catch (const nlohmann::json::exception&) {
     throw fail();
   }
@@ -233,9 +223,6 @@ std::vector<Treatment> Treatments(const StudyResults& results, const std::string
   std::map<std::vector<std::string>, std::size_t> index;
   for (std::size_t n = 0; n < results.trials.size(); ++n) {
     const TrialRow& row = results.trials[n];
-    if (row.aside) {
-      continue;
-    }
     const auto [it, is_new] = index.try_emplace(row.values, treatments.size());
     if (is_new) {
       treatments.push_back({row.values, TreatmentLabel(results.axes, row.values), {}, {}});

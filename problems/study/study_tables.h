@@ -28,7 +28,6 @@ struct TrialRow {
   // table that is the same in every run.
   double wall_s = kNaN;
   std::vector<double> depth_pit = {}, left_out_pit = {};  // the same as shares by bin (scores.h)
-  bool aside = false;  // StudyTrial::aside: in no table of treatments
 };
 
 struct StudyResults {
@@ -37,7 +36,7 @@ struct StudyResults {
   std::vector<TrialRow> trials;    // in the order of the plan
   std::vector<std::string> notes;  // of the plan; AreaNotes; the tags
   std::vector<std::string> tags = {};
-  Preference preference = {};  // of the metric: what a search was told, else its own
+  Preference preference = {};  // of the metric
 
   int Count(const std::string& status) const;
   // Does a trial that is done have the metric?
@@ -52,7 +51,7 @@ StudyResults ReadStudyResults(const std::filesystem::path& folder);
 // where all areas are alike, or where the metric has none.
 std::vector<std::string> AreaNotes(const StudyResults& results);
 
-// One treatment: the trials that differ in the subject only, but for those put aside.
+// One treatment: the trials that differ in the subject only.
 struct Treatment {
   std::vector<std::string> values;           // one per axis
   std::string label;                         // TreatmentLabel of them

@@ -20,7 +20,6 @@ struct StudyTrial {
   std::vector<std::string> values;  // one per axis, as short text; empty where the row has none
   Experiment experiment;
   std::vector<std::string> tags = {};  // of its subject
-  bool aside = false;  // in no ranking: a short run of a search, or of a subject held out of it
 };
 
 // A subject of the study, with the experiment that its trials vary.

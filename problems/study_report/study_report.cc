@@ -17,7 +17,6 @@
 #include "problems/study/trial_folder.h"
 #include "problems/study_report/identify_report.h"
 #include "problems/study_report/results_sqlite.h"
-#include "problems/study_report/search_report.h"
 #include "problems/study_report/study_charts.h"
 #include "problems/study_report/study_ranking.h"
 #include "problems/study_report/study_subtables.h"
@@ -445,9 +444,6 @@ std::string ReportOf(const StudyResults& results, const std::filesystem::path& r
                            "box plot of the metric, one row per treatment"}};
   }
   report.sections = MetricSections(results, ranked, maps);
-  if (const auto search = ReadSearchResults(root, results)) {
-    report.sections.insert(report.sections.begin(), SearchSection(results, *search));
-  }
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
   report.notes = Notes(results);

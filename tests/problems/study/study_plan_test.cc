@@ -94,15 +94,18 @@ TEST_F(StudyPlanTest, SamplesStayInTheirRangesAndFillThem) {
   EXPECT_EQ(slices.size(), 10u);  // one in each tenth
 }
 
-TEST(StudySamples, SobolPointsAreEvenInEachHalf) {
-  const auto points = UnitSamples(SampleMethod::kSobol, 15, 2, 0);
+TEST_F(StudyPlanTest, SobolSamplesAreEvenInEachHalfOfARange) {
+  const StudyPlan plan = Plan(
+      "sample: {method: sobol, n: 15, ranges: {seeds.weight: [1.0, 2.0], rounds: [1, "
+      "5]}}\n");
+  ASSERT_EQ(plan.trials.size(), 15u);
+  const Experiment& first = plan.trials[0].experiment;
+  EXPECT_NEAR(first.seeds.weight, 1.5, 1e-12);
   int low = 0;
-  for (const auto& p : points) {
-    low += p[0] < 0.5 ? 1 : 0;
+  for (const StudyTrial& trial : plan.trials) {
+    low += trial.experiment.seeds.weight < 1.5 ? 1 : 0;
   }
   EXPECT_EQ(low, 7);
-  EXPECT_NEAR(points[0][0], 0.5, 1e-12);
-  EXPECT_NEAR(points[0][1], 0.5, 1e-12);
 }
 
 TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
@@ -147,14 +150,11 @@ TEST_F(StudyPlanTest, WithoutSubjectsItIsAFaultOrForWhoOnlyLooksANote) {
                ConfigError);
 }
 
-TEST_F(StudyPlanTest, ASubjectHeldOutOfASearchIsNoneToSearchOn) {
-  const std::string text =
-      "subjects: [{name: b, optional: true, set: {subject: {type: files, skull: none.ply, "
-      "landmarks: none.yaml}}}]\n"
-      "search: {budget: 4, choices: {rounds: [1, 2]}, held_out: [{name: c}]}\n";
-  EXPECT_THAT(Faults(text), HasSubstr("study.yaml: no subject is left"));
-  EXPECT_THAT(ReadStudy(Write(kBase + text), WithoutSubjects::kNote).notes,
-              ElementsAre(HasSubstr("subject b: skipped"), HasSubstr("no subject is left")));
+TEST_F(StudyPlanTest, ASearchIsRefusedWithWhatReplacesIt) {
+  EXPECT_EQ(Faults("subjects: [{name: a}]\nsearch: {budget: 4}\n"),
+            (folder_ / "study.yaml").string() +
+                ":5:9: search: removed in 1.0; use Optuna, as docs/examples/search_with_optuna.py "
+                "does");
 }
 
 TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {

@@ -28,12 +28,6 @@ TEST(StudyEta, SaysRateAndTimeLeftOfWhatWasDoneHere) {
             "3 of 8 trials, 75 s so far");
 }
 
-TEST(StudyEta, OfASearchItCountsWhatIsStillToBeAskedFor) {
-  EXPECT_EQ(EtaText({.trials = 8, .finished = 8, .elapsed_s = 16, .later = 12}),
-            "8 of about 20 trials, 2.0 s each, about 24 s left");
-  EXPECT_EQ(BarText({.trials = 4, .finished = 4, .later = 4}, 8), "[####....]");
-}
-
 TEST(StudyEta, TheBarFillsFromEmptyToFull) {
   EXPECT_EQ(BarText({.trials = 4, .finished = 0}, 8), "[........]");
   EXPECT_EQ(BarText({.trials = 4, .finished = 3}, 8), "[######..]");
