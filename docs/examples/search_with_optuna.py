@@ -2,11 +2,10 @@
 """Searches for the best scheme of tissue depths and its parameters on phantoms: Optuna calls the Python module (docs/python.md).
 
 Several processes share one SQLite file. A second call with the same file continues the search, also after `kill -9`: the trials that ended stay, and
-those that were interrupted are not counted. Needs Debian's python3-optuna (3.1).
-
+interrupted trials are not counted. Needs Debian's python3-optuna (3.1).
     PYTHONPATH=build/python python3 docs/examples/search_with_optuna.py --trials 60 --jobs 4 --phantoms 3
 """
-import argparse, concurrent.futures, multiprocessing, pathlib
+import argparse, concurrent.futures, functools, multiprocessing, pathlib
 
 import optuna
 import semblance
@@ -35,12 +34,12 @@ def objective(trial, given):
 
 def open_study(given, seed):
     storage = optuna.storages.RDBStorage(f"sqlite:///{given.storage}", engine_kwargs={"connect_args": {"timeout": 60}})
-    return optuna.create_study(storage=storage, study_name=f"{given.phantoms} phantoms", load_if_exists=True,
-                               sampler=optuna.samplers.TPESampler(seed=seed))
+    return optuna.create_study(storage=storage, study_name=f"{given.phantoms} phantoms", load_if_exists=True, sampler=optuna.samplers.TPESampler(seed=seed))
 
 
-def work(given, seed, trials):
-    open_study(given, seed).optimize(lambda trial: objective(trial, given), n_trials=trials, catch=(semblance.InputError,))
+def work(given, job):
+    trials = len(range(job, given.left, given.jobs))
+    open_study(given, given.first + job).optimize(lambda trial: objective(trial, given), n_trials=trials, catch=(semblance.InputError,))
 
 
 if __name__ == "__main__":
@@ -52,12 +51,9 @@ if __name__ == "__main__":
     parser.add_argument("--config", default=str(pathlib.Path(__file__).resolve().parents[2] / "configs/phantom.yaml"))
     given = parser.parse_args()
     before = open_study(given, 0).trials
-    left = max(0, given.trials - sum(trial.state.is_finished() for trial in before))
-    jobs = range(min(given.jobs, left))
+    given.first, given.left = len(before), given.trials - sum(trial.state.is_finished() for trial in before)
     with concurrent.futures.ProcessPoolExecutor(given.jobs, multiprocessing.get_context("spawn")) as pool:
-        ended = [pool.submit(work, given, len(before) + job, len(range(job, left, given.jobs))) for job in jobs]
-    for job in ended:
-        job.result()  # raises what the process raised
+        list(pool.map(functools.partial(work, given), range(min(given.jobs, given.left))))
     done = open_study(given, 0).get_trials(states=[optuna.trial.TrialState.COMPLETE])
     print(f"{len(done)} trials completed; the best:")
     for trial in sorted(done, key=lambda trial: trial.value)[:5]:
