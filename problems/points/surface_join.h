@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/config/config_errors.h"
+#include "problems/config/config_tree.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline_query/surface_edge.h"
 

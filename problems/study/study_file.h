@@ -29,7 +29,6 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/config/config_errors.h"
 #include "problems/config/config_tree.h"
 #include "surfaces/base/fields.h"
 

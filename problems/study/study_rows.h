@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/config/config_errors.h"
+#include "problems/config/config_tree.h"
 #include "problems/study/study_file.h"
 
 namespace semblance {
