@@ -18,11 +18,13 @@
 // `Fields` calls the visitor once per field, with the name, range, unit and meaning of the field
 // and a reference to its value. Each task is one visitor, so all of them agree on the same list:
 //
-//     text --ParseConfigText--> ConfigNode --ReadValue--> struct --ToTree--> ConfigNode --ToYaml-->
-//     text
-//          config.cc, yaml-cpp  config_tree.h             |                  config_tree.h
-//                                                         +--DescribeType--> ConfigType
-//                                                            ReferenceText, SchemaText, ValueJson
+//     YAML text                                              YAML text
+//        | ParseConfigText (config.cc, yaml-cpp)                ^ ToYaml (config_tree.h)
+//        v                                                      |
+//     ConfigNode ----ReadValue----> option struct ----ToTree--> ConfigNode
+//                                        |
+//                                        +----DescribeType----> ConfigType
+//                                                               ReferenceText, SchemaText, ...
 //
 //   1. ParseConfigText turns text into a ConfigNode: a tree of maps, lists and scalars that
 //      remembers the file, line and column of each entry. It knows no option. `base:` files and
@@ -34,10 +36,8 @@
 //      calls CheckValue(report, struct), if the struct has one, for rules that involve several
 //      fields. ReadConfigTree finally calls FaultsBetween(T), if there is one, for rules across
 //      structs. Every fault goes to ConfigErrors; none ends the reading.
-//   3. ToTree (config_binder.h) does the reverse: it writes every field, with numbers that read
-//   back
-//      bit for bit. The result is `resolved.yaml`, and the text from which ids of trials are
-//      hashed.
+//   3. ToTree (config_binder.h) does the reverse: it writes every field, and numbers so that they
+//      read back bit for bit. Its text is `resolved.yaml`, and the ids of trials are its hashes.
 //   4. DescribeType (config_binder.h) collects names, types, defaults, ranges and meanings into a
 //      ConfigType. options_reference.h prints it as text (`semblance options`), as JSON Schema for
 //      editors, and as JSON values for the workbench.

@@ -40,7 +40,7 @@ struct StudyArguments {
 };
 
 int PrintPlan(const StudyPlan& plan, const std::string& only) {
-  const std::vector<bool> chosen = TrialsThat(plan, only);
+  const std::vector<bool> chosen = SelectTrials(plan, only);
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     const StudyTrial& trial = plan.trials[n];
     if (chosen[n]) {
@@ -175,7 +175,7 @@ int StudyCommand(const StudyArguments& a) {
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   const StudyResults results = WriteStudyTables(folder);
   return options.only.empty() ? PrintStudyState(results, root)
-                              : PrintPartState(results, TrialsThat(plan, options.only), root);
+                              : PrintPartState(results, SelectTrials(plan, options.only), root);
 }
 
 int MergeCommand(const StudyArguments& a) {

@@ -97,7 +97,7 @@ class StudyRunner {
 
   // The trials of this shard.
   void Run() {
-    const std::vector<bool> chosen = TrialsThat(plan_, options_.only);
+    const std::vector<bool> chosen = SelectTrials(plan_, options_.only);
     for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
       if (static_cast<int>(n % options_.shards) == options_.shard && chosen[n]) {
         Queue(plan_.trials[n]);
@@ -407,7 +407,7 @@ void RequirePlanOf(const fs::path& folder, const std::vector<fs::path>& others) 
 
 StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
                       const RunContext& context) {
-  TrialsThat(plan, options.only);  // what is wrong with it is said before anything is written,
+  SelectTrials(plan, options.only);  // what is wrong with it is said before anything is written,
   CacheOnDisk(options);            // and so is what is wrong with the cache
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
   const PlanThere there = ReadPlanThere(folder);

@@ -22,7 +22,7 @@ struct StudyRunOptions {
   int shard = 0;  // of shards: trials n with n % shards == shard
   int shards = 1;
   Rerun rerun = Rerun::kNothing;
-  std::string only = {};             // a condition for the trials to run (TrialsThat); empty: all
+  std::string only = {};             // a condition for the trials to run (SelectTrials); empty: all
   std::filesystem::path cache = {};  // folder for implicit faces, shared by processes; empty: none
   int cache_limit_mb = 2000;
   // May be empty. Called from one thread at a time: each second, and after each trial with its
@@ -50,7 +50,7 @@ struct StudySummary {
 // (its trial.json then lists the axes of the changed study), unless it lacks the files that `keep`
 // asks for now; one that is no longer in the plan stays where it is and is in no table. Throws
 // IoError if the folder cannot be written or holds a plan that shares no trial with this one,
-// InputError as TrialsThat, Cancelled on request (after the trials at
+// InputError as SelectTrials, Cancelled on request (after the trials at
 // hand).
 StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
                       const StudyRunOptions& options, const RunContext& context);

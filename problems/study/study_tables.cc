@@ -14,7 +14,6 @@
 #include <utility>
 
 #include "problems/study/trial_folder.h"
-#include "problems/study/trial_numbers.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"

@@ -4,9 +4,11 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace semblance {
@@ -39,5 +41,17 @@ nlohmann::ordered_json HashesOf(const std::filesystem::path& trial,
 // taken. Throws IoError if it cannot be read or written.
 std::string CopyTrial(const std::filesystem::path& from, const std::filesystem::path& to,
                       const std::string& id);
+
+struct TrialNumbers {
+  std::string id, status = "failed", reason;
+  std::map<std::string, double> metrics;             // numbers of `result` by dotted path
+  std::map<std::string, std::vector<double>> lists;  // numbers in lists of it, in their order, a
+                                                     // list of objects as one list per member;
+                                                     // NaN for null
+};
+
+// Nothing for what is no JSON, no object, nested deeper than kDeepestJson, or where id, status or
+// reason is no text.
+std::optional<TrialNumbers> ReadTrialNumbers(std::string_view text);
 
 }  // namespace semblance

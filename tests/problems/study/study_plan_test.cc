@@ -9,7 +9,7 @@
 #include <set>
 #include <string>
 
-#include "problems/study/study_rows.h"
+#include "problems/study/study_file.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
@@ -218,7 +218,7 @@ TEST_F(StudyPlanTest, AConditionChoosesTrialsBySubjectTagAndAxes) {
       "subjects: [{name: a, tags: [odd]}, {name: b, tags: [even, big], set: {subject.random_seed: "
       "7}}]\ngrid: {interp: [nearest, mean], rounds: [1, 2, 10]}\n");
   const auto count = [&](const std::string& condition) {
-    const std::vector<bool> chosen = TrialsThat(plan, condition);
+    const std::vector<bool> chosen = SelectTrials(plan, condition);
     return std::count(chosen.begin(), chosen.end(), true);
   };
   EXPECT_EQ(count(""), 12);

@@ -121,7 +121,7 @@ TEST_F(StudyTest, OnlyWhatIsAskedForRunsAndTheRestFollowsLater) {
   EXPECT_EQ(StudyFiles(folder_ / "run"), StudyFiles(folder_ / "whole"));
   EXPECT_THAT(
       WordsOf<InputError>([&] { RunStudy(plan, folder_ / "none", {.only = "subject = x"}, {}); }),
-      HasSubstr("none of the 4 trials is so"));
+      HasSubstr("holds for none of the 4 trials"));
   EXPECT_FALSE(fs::exists(folder_ / "none"));
 }
 
