@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kTrialFile = "trial.json";
 
-// Null for what is no JSON.
+// Returns null if the file is not JSON.
 Json ParsedOrNull(const fs::path& file) {
   try {
     return ParseJson(ReadFileBytes(file), file.string());
@@ -31,18 +31,18 @@ Json ParsedOrNull(const fs::path& file) {
   }
 }
 
-bool IsThere(const fs::path& file) {
+bool Exists(const fs::path& file) {
   std::error_code ignored;
   return fs::exists(file, ignored);
 }
 
-// A member that is a text, if it is there at all.
+// Returns true if the member is a text or missing.
 bool IsTextOrMissing(const Json& json, const char* key) {
   return !json.contains(key) || json[key].is_string();
 }
 
-// Why the hashes that `list` states do not hold; empty if they do.
-std::string FaultOfHashes(const fs::path& trial, std::span<const fs::path> files,
+// Returns the first mismatch between the files and the hashes in `list`, or "".
+std::string FindHashFault(const fs::path& trial, std::span<const fs::path> files,
                           const Json& list) {
   for (const Json& entry : list.is_array() ? list : Json::array()) {
     const bool is_named = entry.is_object() && entry.contains("file") && entry["file"].is_string();
@@ -57,20 +57,20 @@ std::string FaultOfHashes(const fs::path& trial, std::span<const fs::path> files
   return "";
 }
 
-std::string FaultOfFiles(const fs::path& trial, std::span<const fs::path> files,
-                         const Json& trial_json) {
-  const std::string fault = FaultOfHashes(trial, files, trial_json.value("files", Json()));
-  const Json manifest = fault.empty() && IsThere(trial / "manifest.json")
+std::string FindFileFault(const fs::path& trial, std::span<const fs::path> files,
+                          const Json& trial_json) {
+  const std::string fault = FindHashFault(trial, files, trial_json.value("files", Json()));
+  const Json manifest = fault.empty() && Exists(trial / "manifest.json")
                             ? ParsedOrNull(trial / "manifest.json")
                             : Json::object();
   if (!fault.empty() || !manifest.is_object()) {
     return fault.empty() ? "manifest.json cannot be read" : fault;
   }
-  return FaultOfHashes(trial, files, manifest.value("outputs", Json()));
+  return FindHashFault(trial, files, manifest.value("outputs", Json()));
 }
 
-// The files of a folder, relative to it, trial.json last; a complaint where not all are plain
-// files.
+// Lists the files of a folder, relative to it, trial.json last. Returns a fault if the folder holds
+// anything but plain files and folders, else "".
 std::string ListFiles(const fs::path& trial, std::vector<fs::path>& files) {
   if (fs::is_symlink(trial)) {
     return "it is a link";
@@ -89,13 +89,14 @@ std::string ListFiles(const fs::path& trial, std::vector<fs::path>& files) {
   return "";
 }
 
-// Follows the text of a trial.json; false ends the reading.
+// Collects TrialNumbers during the parse of a trial.json. A member that returns false ends the
+// parse.
 class TrialHandler : public nlohmann::json_sax<Json> {
  public:
-  TrialNumbers Take() { return std::move(trial_); }
+  TrialNumbers TakeNumbers() { return std::move(trial_); }
 
-  bool null() override { return lists_open_ > 0 ? Number(kNaN) : IsInObject() && IsNoText(); }
-  bool boolean(bool) override { return IsInObject() && IsNoText(); }
+  bool null() override { return lists_open_ > 0 ? Number(kNaN) : IsInObject() && IsNotText(); }
+  bool boolean(bool) override { return IsInObject() && IsNotText(); }
   bool number_integer(number_integer_t value) override {
     return Number(static_cast<double>(value));
   }
@@ -106,8 +107,8 @@ class TrialHandler : public nlohmann::json_sax<Json> {
   bool binary(binary_t&) override { return false; }
 
   bool string(string_t& value) override {
-    if (std::string* head = Head()) {
-      *head = std::move(value);
+    if (std::string* place = TextPlace()) {
+      *place = std::move(value);
     }
     return IsInObject();
   }
@@ -118,16 +119,16 @@ class TrialHandler : public nlohmann::json_sax<Json> {
   }
 
   bool start_object(std::size_t) override {
-    const bool is_taken = IsNoText();
+    const bool go_on = IsNotText();
     path_lengths_.push_back(path_.size());
-    return is_taken;
+    return go_on;
   }
   bool end_object() override { return End(); }
   bool start_array(std::size_t) override {
     ++lists_open_;
-    const bool is_taken = IsInObject() && IsNoText();
+    const bool go_on = IsInObject() && IsNotText();
     path_lengths_.push_back(path_.size());
-    return is_taken;
+    return go_on;
   }
   bool end_array() override {
     --lists_open_;
@@ -139,16 +140,16 @@ class TrialHandler : public nlohmann::json_sax<Json> {
   }
 
  private:
-  // Where the text goes that follows; null if it is kept nowhere.
-  std::string* Head() {
+  // Returns the place for the text at the current path, or null if that text is not kept.
+  std::string* TextPlace() {
     return path_lengths_.size() != 1 ? nullptr
            : path_ == "id"           ? &trial_.id
            : path_ == "status"       ? &trial_.status
            : path_ == "reason"       ? &trial_.reason
                                      : nullptr;
   }
-  bool IsInObject() const { return !path_lengths_.empty(); }  // a trial.json is one itself
-  bool IsNoText() { return Head() == nullptr; }
+  bool IsInObject() const { return !path_lengths_.empty(); }  // trial.json itself is an object
+  bool IsNotText() { return TextPlace() == nullptr; }
 
   bool Number(double value) {
     constexpr std::string_view kResult = "result.";
@@ -159,7 +160,7 @@ class TrialHandler : public nlohmann::json_sax<Json> {
         trial_.metrics[path_.substr(kResult.size())] = value;
       }
     }
-    return IsInObject() && IsNoText();
+    return IsInObject() && IsNotText();
   }
 
   bool End() {
@@ -169,8 +170,9 @@ class TrialHandler : public nlohmann::json_sax<Json> {
   }
 
   TrialNumbers trial_;
-  std::string path_;                       // of the value that follows
-  std::vector<std::size_t> path_lengths_;  // where each open list or object began
+  std::string path_;  // path of the next value
+  std::vector<std::size_t>
+      path_lengths_;  // length of path_ at the start of each open list or object
   int lists_open_ = 0;
 };
 
@@ -180,7 +182,7 @@ fs::path TrialFolder(const fs::path& study, const std::string& id) { return stud
 
 std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) {
   const fs::path file = TrialFolder(study, id) / kTrialFile;
-  if (!IsThere(file)) {
+  if (!Exists(file)) {
     return std::nullopt;
   }
   Json json = ParsedOrNull(file);
@@ -189,31 +191,31 @@ std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) 
   return is_whole ? std::optional(std::move(json)) : std::nullopt;
 }
 
-PlanThere ReadPlanThere(const fs::path& study) {
+StoredPlan ReadStoredPlan(const fs::path& study) {
   const fs::path file = study / "plan.json";
-  if (!IsThere(file)) {
+  if (!Exists(file)) {
     return {};
   }
   const Json json = ParsedOrNull(file);
   if (!json.is_object() || !json.contains("hash") || !json["hash"].is_string()) {
     throw IoError(fmt::format(
-        "{}: not the plan of a study; choose another folder, or delete this file, and the study "
-        "goes on with the trials that are there",
+        "{}: not the plan of a study; choose another folder, or delete this file: the study then "
+        "continues with the existing trials",
         file.string()));
   }
-  PlanThere there{.hash = json["hash"].get<std::string>(), .ids = {}};
+  StoredPlan plan{.hash = json["hash"].get<std::string>(), .ids = {}};
   const Json trials = json.value("trials", Json());
   for (const Json& trial : trials.is_array() ? trials : Json::array()) {
     if (trial.is_object() && trial.contains("id") && trial["id"].is_string()) {
-      there.ids.push_back(trial["id"].get<std::string>());
+      plan.ids.push_back(trial["id"].get<std::string>());
     }
   }
-  return there;
+  return plan;
 }
 
-std::string PlanHashOf(const fs::path& study) { return ReadPlanThere(study).hash; }
+std::string ReadPlanHash(const fs::path& study) { return ReadStoredPlan(study).hash; }
 
-Json HashesOf(const fs::path& trial, const std::vector<std::string>& names) {
+Json ListHashes(const fs::path& trial, const std::vector<std::string>& names) {
   Json list = Json::array();
   for (const std::string& name : names) {
     list.push_back({{"file", name}, {"sha256", Sha256OfFile(trial / name)}});
@@ -227,7 +229,7 @@ std::string CopyTrial(const fs::path& from, const fs::path& to, const std::strin
   std::vector<fs::path> files;
   std::string fault = json ? ListFiles(trial, files) : "it is not whole";
   if (fault.empty()) {
-    fault = FaultOfFiles(trial, files, *json);
+    fault = FindFileFault(trial, files, *json);
   }
   if (!fault.empty()) {
     return fault;
@@ -247,7 +249,7 @@ std::optional<TrialNumbers> ReadTrialNumbers(std::string_view text) {
     return std::nullopt;
   }
   TrialHandler handler;
-  return Json::sax_parse(text, &handler) ? std::optional(handler.Take()) : std::nullopt;
+  return Json::sax_parse(text, &handler) ? std::optional(handler.TakeNumbers()) : std::nullopt;
 }
 
 }  // namespace semblance

@@ -34,7 +34,7 @@ class TrialFolders : public ::testing::Test {
     Write("timing.json", "{}");
     WriteTrial({{"id", "a"},
                 {"status", "done"},
-                {"files", HashesOf(From(), {"face.ply", "pictures/front.png"})}});
+                {"files", ListHashes(From(), {"face.ply", "pictures/front.png"})}});
   }
 
   fs::path From() const { return TrialFolder(folder_ / "from", "a"); }
@@ -72,7 +72,7 @@ TEST_F(TrialFolders, AFileThatIsMissingOrChangedIsFound) {
 TEST_F(TrialFolders, TheManifestOfARunCountsToo) {
   WriteTrial({{"id", "a"}, {"status", "done"}});
   nlohmann::ordered_json manifest;
-  manifest["outputs"] = HashesOf(From(), {"face.ply"});
+  manifest["outputs"] = ListHashes(From(), {"face.ply"});
   Write("manifest.json", manifest.dump());
   EXPECT_THAT(Copy(), IsEmpty());
   fs::remove_all(To());
@@ -119,14 +119,14 @@ TEST_F(TrialFolders, WhatABrokenTrialHasLeftIsReplacedAndOtherFilesStay) {
 }
 
 TEST_F(TrialFolders, APlanIsOfAStudyOrAnError) {
-  EXPECT_EQ(PlanHashOf(folder_ / "from"), "");
+  EXPECT_EQ(ReadPlanHash(folder_ / "from"), "");
   const fs::path file = folder_ / "from/plan.json";
   for (const char* text : {"", "{", "[]", "{}", "{\"hash\": 7}"}) {
     WriteFileAtomically(file, text);
-    EXPECT_THROW(PlanHashOf(folder_ / "from"), IoError) << text;
+    EXPECT_THROW(ReadPlanHash(folder_ / "from"), IoError) << text;
   }
   WriteFileAtomically(file, "{\"hash\": \"h\"}");
-  EXPECT_EQ(PlanHashOf(folder_ / "from"), "h");
+  EXPECT_EQ(ReadPlanHash(folder_ / "from"), "h");
 }
 
 // The same by way of a tree.
