@@ -19,7 +19,7 @@
 namespace semblance {
 namespace {
 
-// Every combination of one of `left` with one of `right`, the last varying fastest.
+// Combines each row of `left` with each row of `right`. The right row varies fastest.
 std::vector<StudyRow> Product(const std::vector<StudyRow>& left,
                               const std::vector<StudyRow>& right) {
   std::vector<StudyRow> rows;
@@ -53,7 +53,7 @@ std::vector<StudyRow> ZipRows(const OptionAxes& zip, ConfigErrors& errors) {
   for (const OptionAxes::Entry& axis : zip.entries) {
     if (axis.value.size() != rows.size()) {
       errors.Add(axis.key_location, JoinPath("zip", axis.key),
-                 fmt::format("{} values, but '{}' has {}; the lists of zip go side by side",
+                 fmt::format("{} values, but '{}' has {}; all lists of zip have the same length",
                              axis.value.size(), first.key, rows.size()));
       continue;
     }
@@ -74,10 +74,10 @@ std::vector<StudyRow> ListRows(const std::vector<OptionValues>& list) {
 
 struct SampleRange {
   double low = 0, high = 0;
-  bool whole = false;  // both ends are written as whole numbers: so are the samples
+  bool whole = false;  // samples are whole numbers, because both ends are written so
 };
 
-// Nothing, and an error, if the two are not a lower and a higher number.
+// Reads a range. If the two are not a lower and a higher number, adds an error and returns nothing.
 std::optional<SampleRange> ReadRange(const std::string& path, const ConfigLocation& location,
                                      const std::array<ConfigNode, 2>& ends, ConfigErrors& errors) {
   SampleRange range;
@@ -85,7 +85,7 @@ std::optional<SampleRange> ReadRange(const std::string& path, const ConfigLocati
   ReadScalar(errors, {ends[0], JoinPath(path, std::size_t{0}), FieldInfo{}}, range.low);
   ReadScalar(errors, {ends[1], JoinPath(path, std::size_t{1}), FieldInfo{}}, range.high);
   if (errors.size() == before && !(range.low < range.high)) {
-    errors.Add(location, path, "the first number must be the lower");
+    errors.Add(location, path, "the first number must be lower than the second");
   }
   range.whole = std::all_of(ends.begin(), ends.end(), [](const ConfigNode& end) {
     return end.text.find_first_of(".eE") == std::string::npos;
@@ -98,7 +98,8 @@ std::vector<std::vector<double>> SobolPoints(int n, int dimensions) {
   std::vector<std::vector<double>> points(n, std::vector<double>(dimensions));
   for (auto& point : points) {
     for (double& x : point) {
-      x = static_cast<double>(engine() >> 11) * 0x1.0p-53;  // of 64 bits, as many as fit
+      x = static_cast<double>(engine() >> 11) *
+          0x1.0p-53;  // the 53 highest bits, which a double holds
     }
   }
   return points;
@@ -156,7 +157,7 @@ std::vector<StudyRow> SampleRows(const std::optional<StudySamples>& samples, Con
   return rows;
 }
 
-// As a number that cannot overflow.
+// Counts the trials. The result is a double because it could overflow an integer.
 double TrialCount(const StudyFile& study) {
   const auto at_least_one = [](const auto& list) {
     return static_cast<double>(std::max<std::size_t>(list.size(), 1));
@@ -184,16 +185,17 @@ StudyFile ReadStudyFile(const std::filesystem::path& file, ConfigNode& tree, Con
 }
 
 std::string ComplaintAboutSize(const StudyFile& study) {
+  constexpr double kMaxTrials = 100'000;
   const double count = TrialCount(study);
-  return count <= kMostTrials
+  return count <= kMaxTrials
              ? ""
              : fmt::format(
                    "subjects, grid, zip, list and sample make {:.6g} trials; a study has at most "
                    "{:.0f}: take values out, or draw some with sample",
-                   count, kMostTrials);
+                   count, kMaxTrials);
 }
 
-std::vector<StudyRow> StudyRows(const StudyFile& study, ConfigErrors& errors) {
+std::vector<StudyRow> MakeStudyRows(const StudyFile& study, ConfigErrors& errors) {
   return Product(Product(GridRows(study.grid), ZipRows(study.zip, errors)),
                  Product(ListRows(study.list), SampleRows(study.sample, errors)));
 }

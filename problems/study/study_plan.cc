@@ -414,7 +414,7 @@ StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects) {
   TrialFaults faults;
   ConfigErrors base_errors;
   const auto [subjects, others] = SubjectReader(study, tree, defaults, base_errors).Read();
-  const std::vector<StudyRow> rows = StudyRows(study, errors);
+  const std::vector<StudyRow> rows = MakeStudyRows(study, errors);
   faults.Add(errors);
   faults.Add(base_errors);
   if (base_errors.size() > 0) {

@@ -36,31 +36,32 @@
 //
 // Invariants:
 //
-//   (1) A trial exists if and only if its trial.json parses and holds its id. Other files in its
-//       folder, whatever they are, do not make it exist.
-//   (2) Every file is written under a temporary name and renamed. trial.json is written last. So a
-//       trial that exists has all its files.
-//   (3) trial.json is synced if other results are written with it, and its files are synced before
-//       it. So (2) also holds after a power failure. A trial.json alone need not be synced: if it
-//       is lost or empty, (1) makes the trial run again.
-//   (4) The id of a trial is a hash of its resolved experiment and the content of its input files.
-//       A trial on disk is therefore valid for every plan that contains its id: a changed study
-//       keeps the trials that it still has, and no trial is ever invalidated.
-//   (5) trial.json holds no time, host, folder or number of threads. Its bytes depend on the trial,
-//       the axes of the plan, and the version of the program and its libraries alone. What differs
-//       from run to run is in timing.json, which trial.json does not list.
-//   (6) Shard i of n owns the trials k with k % n == i. Shards share no trial, hold no lock, and
-//       never read one another's trials. If two processes nevertheless run the same trial, both
-//       write the same bytes (5) by renames (2), and either order is right.
-//   (7) Within a process a trial is claimed once, because next_ is atomic and queue_ is constant
-//       while threads run. A trial runs on one thread, so its result does not depend on `jobs`.
-//   (8) mutex_ guards summary_, broken_, ended_ and the calls of on_progress.
-//   (9) An exception inside a trial is that trial's result (FAILED, with the reason). A fault in
-//       writing the folder ends the whole queue (broken_), because no other trial could be written.
-//  (10) plan.json is written before the first trial runs. It lists the trials for tables and
-//  merges;
-//       the queue reads it only to refuse the folder of another study and to count trials that are
-//       left over.
+//   (1)  A trial exists if and only if its trial.json parses and holds its id. Other files in its
+//        folder do not make it exist.
+//   (2)  Every file is written under a temporary name and renamed. trial.json is written last. So
+//        a trial that exists has all its files. During a rerun the earlier trial.json stays until
+//        the rename; a merge notices files that differ from it by their hashes.
+//   (3)  Unless `keep` is summary, trial.json and the results before it are synced, so that (2)
+//        holds after a power failure too. With `keep: summary` there are no other results: if
+//        trial.json is lost or empty, (1) makes the trial run again.
+//   (4)  The id of a trial is a hash of its resolved experiment and the content of its input
+//        files. A trial on disk is therefore valid for every plan that contains its id: a changed
+//        study keeps the trials that it still has, and no trial becomes invalid.
+//   (5)  trial.json holds no time, host, folder or number of threads. Its bytes depend only on
+//        the trial, on the axes and `keep` of the plan, and on the versions of the program and
+//        its libraries. Everything else is in timing.json, which trial.json does not list.
+//   (6)  Shard i of n owns the trials k with k % n == i. Shards share no trial, hold no lock, and
+//        never read each other's trials. If two processes nevertheless run the same trial, both
+//        write the same bytes (5) by renames (2), and either order is right.
+//   (7)  Within a process a trial is claimed once, because next_ is atomic and queue_ is constant
+//        while threads run. A trial runs on one thread, so its result does not depend on `jobs`.
+//   (8)  mutex_ guards summary_, broken_, ended_ and the calls of on_progress.
+//   (9)  An exception inside a trial is the result of that trial (FAILED, with the reason). A
+//        fault in writing the folder ends the whole queue (broken_), because no other trial could
+//        be written.
+//  (10)  plan.json is written before the first trial runs. It lists the trials for tables and
+//        merges. The queue reads it only to refuse the folder of another study and to count left-
+//        over trials.
 #include "problems/study/study_run.h"
 
 #include <fmt/format.h>

@@ -117,8 +117,9 @@ TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
   EXPECT_EQ(std::count(twice.begin(), twice.end(), '\n'), 0) << twice;
   EXPECT_THAT(Faults("grids: {}\n"), HasSubstr("did you mean 'grid'?"));
   EXPECT_THAT(Faults("grid: {interp: nearest}\n"), HasSubstr("grid.interp: expected a list"));
-  EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("go side by side"));
-  EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"), HasSubstr("must be the lower"));
+  EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("have the same length"));
+  EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"),
+              HasSubstr("must be lower than"));
   EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"),
               HasSubstr("the name 'a' appears twice"));
   EXPECT_THAT(Faults("grid: {rounds: [2, 2]}\n"), HasSubstr("are the same experiment"));
