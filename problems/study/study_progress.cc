@@ -19,7 +19,7 @@ std::string Duration(double seconds) {
                         : fmt::format("{:.1f} h", seconds / 3600);
 }
 
-// A stream that takes nothing is no reason for a study to stop.
+// Ignores a stream that cannot be written: it must not stop a study.
 void Put(std::FILE* stream, const std::string& text) { std::fputs(text.c_str(), stream); }
 
 }  // namespace

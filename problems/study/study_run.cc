@@ -22,14 +22,13 @@
 //                           |  a thread claims it: next_++
 //                           v
 //                    +-------------+  stop request, kill -9
-//                    |   RUNNING   |--------------------------> the disk is as it was before
+//                    |   RUNNING   |-----------------------> the disk is as it was before
 //                    +-------------+
 //                           |  result, faults of the result, or an exception
 //                           v
 //                    +-------------+  kill -9, disk full
-//                    |   WRITING   |--------------------------> trial.json is missing or the
-//                    earlier
-//                    +-------------+                            one; the next call decides as above
+//                    |   WRITING   |-----------------------> trial.json is missing, or still the
+//                    +-------------+                         earlier one; the next call decides
 //                           |  rename of trial.json
 //                           v
 //                 DONE, UNUSABLE or FAILED  (its `status`)
@@ -44,9 +43,9 @@
 //   (3)  Unless `keep` is summary, trial.json and the results before it are synced, so that (2)
 //        holds after a power failure too. With `keep: summary` there are no other results: if
 //        trial.json is lost or empty, (1) makes the trial run again.
-//   (4)  The id of a trial is a hash of its resolved experiment and the content of its input
-//        files. A trial on disk is therefore valid for every plan that contains its id: a changed
-//        study keeps the trials that it still has, and no trial becomes invalid.
+//   (4)  The id of a trial is a hash of its job, its resolved experiment and the content of its
+//        input files. A trial on disk is therefore valid for every plan that contains its id: a
+//        changed study keeps the trials that it still has, and no trial becomes invalid.
 //   (5)  trial.json holds no time, host, folder or number of threads. Its bytes depend only on
 //        the trial, on the axes and `keep` of the plan, and on the versions of the program and
 //        its libraries. Everything else is in timing.json, which trial.json does not list.
@@ -55,7 +54,7 @@
 //        write the same bytes (5) by renames (2), and either order is right.
 //   (7)  Within a process a trial is claimed once, because next_ is atomic and queue_ is constant
 //        while threads run. A trial runs on one thread, so its result does not depend on `jobs`.
-//   (8)  mutex_ guards summary_, broken_, ended_ and the calls of on_progress.
+//   (8)  While threads run, mutex_ guards summary_, broken_, ended_ and the calls of on_progress.
 //   (9)  An exception inside a trial is the result of that trial (FAILED, with the reason). A
 //        fault in writing the folder ends the whole queue (broken_), because no other trial could
 //        be written.

@@ -195,7 +195,7 @@ TEST_F(StudyPlanTest, AMetricMustBeOneThatTheJobAndTheSubjectsHave) {
   EXPECT_NO_THROW(Plan("metric: cross_validation.landmark.sites.g\njob: depth\n"));
   EXPECT_NO_THROW(Plan("metric: cross_validation.side.sites.go_l\njob: depth\n"));
   EXPECT_THAT(Faults("metric: cross_validation.landmark.sites.go\njob: depth\n"),
-              HasSubstr("'go' is of a pair; write go_l or go_r"));
+              HasSubstr("'go' is a paired site; write go_l or go_r"));
   EXPECT_THAT(Faults("metric: cross_validation.foo.sites.g\njob: depth\n"),
               HasSubstr("no trial of job: depth"));
   for (const char* metric : {"depth.process.length_mm", "depth.shares.kriging",
