@@ -78,8 +78,7 @@ void ReadTrial(const fs::path& folder, TrialRow& row) {
 // Reads all trials in parallel: a study has many, and reading them takes most of the time of its
 // tables.
 void ReadTrials(const fs::path& folder, std::vector<TrialRow>& rows) {
-  constexpr std::size_t kBlock =
-      4;  // trials per task; not sensitive: a file takes far longer than a task
+  constexpr std::size_t kBlock = 4;  // trials per task
   ParallelFor(rows.size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())),
               kBlock, [&](std::size_t n) { ReadTrial(folder, rows[n]); });
 }
@@ -179,8 +178,7 @@ StudyResults ReadStudyResults(const fs::path& folder) {
 }
 
 std::vector<std::string> AreaNotes(const StudyResults& results) {
-  constexpr double kTolerance =
-      0.005;  // above the noise of a region's border, below a real change of it
+  constexpr double kTolerance = 0.005;  // relative; a smaller one warns of smaller differences
   const std::string metric = FindAreaMetric(results);
   std::map<std::string, std::pair<double, double>> range_cm2;  // by subject: least and most
   for (const TrialRow& row : results.trials) {

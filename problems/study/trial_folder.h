@@ -35,10 +35,9 @@ nlohmann::ordered_json ListHashes(const std::filesystem::path& trial,
                                   const std::vector<std::string>& names);
 
 // Copies a whole trial to another study's folder, completely or not at all, trial.json last.
-// Returns
-// "", or the reason why it was not copied: a file that trial.json or manifest.json names is missing
-// or has another hash, or the folder has links or devices, which may lead out of it. Throws IoError
-// if a file cannot be read or written.
+// Returns "", or the reason why it was not copied: a file that trial.json or manifest.json names is
+// missing or has another hash, or the folder has links or devices, which may lead out of it. Throws
+// IoError if a file cannot be read or written.
 std::string CopyTrial(const std::filesystem::path& from, const std::filesystem::path& to,
                       const std::string& id);
 
