@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reading strictly: what is accepted, and the exact words for all that is not.
+// The strict reader and its exact messages; bases, overrides, resolved text, reference and schema.
 #include "problems/config/config.h"
 
 #include <fmt/format.h>
@@ -33,7 +33,7 @@ using testing::Thesis;
 
 Options Read(const std::string& text) { return ReadConfigText<Options>(text, "/cfg/x.yaml"); }
 
-// The errors of a text, without the name of the file before each.
+// Returns the errors of a text.
 std::string ErrorsOf(const std::string& text) {
   try {
     ReadConfigText<Options>(text, "x.yaml");
@@ -48,7 +48,7 @@ struct Wrong {
   std::string error;
 };
 
-TEST(Config, SaysExactlyWhatIsWrong) {
+TEST(Config, MessagesAreExact) {
   const std::vector<Wrong> cases = {
       // Keys.
       {"radus_mm: 1", "x.yaml:1:1: radus_mm: unknown key; did you mean 'radius_mm'?"},
@@ -109,7 +109,7 @@ TEST(Config, SaysExactlyWhatIsWrong) {
        "18446744073709551615"},
       {"random_seed: -1",
        "x.yaml:1:14: random_seed: -1 does not fit; allowed is 0 to 18446744073709551615"},
-      // Texts that swallow what follows.
+      // Texts that continue on the next line.
       {"label: \"a\ncount: 3\"",
        "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (write "
        "a text of several lines as a block, after |)"},
@@ -138,7 +138,7 @@ TEST(Config, SaysExactlyWhatIsWrong) {
       {"verbose: \"true\"",
        "x.yaml:1:10: verbose: expected true or false, found the text \"true\""},
       {"verbose: 1", "x.yaml:1:10: verbose: expected true or false, found '1'"},
-      // Null; the place is that of the key.
+      // Null has the location of its key.
       {"count: null", "x.yaml:1:1: count: expected a whole number, found nothing (null)"},
       {"count:\nlabel: a", "x.yaml:1:1: count: expected a whole number, found nothing (null)"},
       {"label: ~", "x.yaml:1:1: label: expected a text, found nothing (null)"},
@@ -167,7 +167,7 @@ TEST(Config, SaysExactlyWhatIsWrong) {
       {"label: \xff", "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
       {"label: \xed\xa0\x80",  // half of a pair of UTF-16
        "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
-      {"label: \xe0\x80\x80",  // longer than it need be
+      {"label: \xe0\x80\x80",  // longer than needed
        "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
       {"label: \xf0\x80\x80\x80", "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
       {"label: \xf4\x90\x80\x80",  // above U+10FFFF
@@ -274,7 +274,7 @@ TEST(Config, AMissingFileIsAnIoError) {
   EXPECT_THROW(ReadConfig<Options>(SEMBLANCE_SOURCE_DIR), IoError);
 }
 
-// Distances by hand.
+// The expected distances were counted by hand.
 TEST(NearestWord, CountsEditsAndSwaps) {
   EXPECT_EQ(EditDistance("kitten", "sitting"), 3);
   EXPECT_EQ(EditDistance("fiel", "file"), 1);
@@ -283,11 +283,12 @@ TEST(NearestWord, CountsEditsAndSwaps) {
   const std::vector<std::string> known = {"thesis", "split", "flat"};
   EXPECT_EQ(NearestWord("splt", known), "split");
   EXPECT_EQ(NearestWord("voronoi", known), "");
-  EXPECT_EQ(NearestWord(std::string(100'000'000, 's'), known), "");  // in no memory to speak of
+  EXPECT_EQ(NearestWord(std::string(100'000'000, 's'), known),
+            "");  // must not allocate by the length
 }
 
-// A run's folder that was sent to somebody: what went in lies beside resolved.yaml.
-TEST(Config, AWholePathThatLeadsNowhereIsAFileBesideThisOne) {
+// Simulates a run's folder on another machine: the inputs lie beside resolved.yaml.
+TEST(Config, AnAbsolutePathThatDoesNotExistIsAFileBesideThisOne) {
   const testing::ScratchFolder folder;
   const std::filesystem::path file = folder / "resolved.yaml";
   const auto skull = [&](const std::filesystem::path& named) {
@@ -297,14 +298,14 @@ TEST(Config, AWholePathThatLeadsNowhereIsAFileBesideThisOne) {
   EXPECT_EQ(skull("/elsewhere/heads/skull.ply"), "/elsewhere/heads/skull.ply");
   WriteFileAtomically(folder / "skull.ply", "ply");
   EXPECT_EQ(skull("/elsewhere/heads/skull.ply"), folder / "skull.ply");
-  // A file that is there is taken as it is named, and so is a path that is not whole.
+  // An existing file and a relative path are taken as written.
   std::filesystem::create_directories(folder / "heads");
   EXPECT_EQ(skull("heads/skull.ply"), folder / "heads/skull.ply");
   WriteFileAtomically(folder / "heads/skull.ply", "ply");
   EXPECT_EQ(skull(folder / "heads/skull.ply"), folder / "heads/skull.ply");
 }
 
-// A folder of small files that goes away with the test.
+// A folder of small files that is removed after the test.
 class ConfigFiles : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -343,7 +344,7 @@ std::string SetErrors(const std::string& text, const std::vector<std::string>& o
   }
 }
 
-TEST_F(ConfigFiles, ABaseLiesBelowKeyByKey) {
+TEST_F(ConfigFiles, AFileIsMergedOverItsBaseKeyByKey) {
   Write("sub/grand.yaml", "label: grand\ncount: 9\nskull: g.ply\n");
   Write("sub/base.yaml",
         "base: grand.yaml\nlast: {level: 2, fraction: 0.25}\nschedule: [{level: 5}, {level: 6}]\n"
@@ -354,7 +355,7 @@ TEST_F(ConfigFiles, ABaseLiesBelowKeyByKey) {
   const Options options = ReadConfig<Options>(file);
   EXPECT_EQ(options.label, "top");
   EXPECT_EQ(options.count, 9);
-  EXPECT_EQ(options.skull, folder_ / "sub" / "g.ply");  // relative to the file that says it
+  EXPECT_EQ(options.skull, folder_ / "sub" / "g.ply");  // relative to the file that names it
   EXPECT_EQ(options.last, (testing::Step{3, 0.25}));
   EXPECT_EQ(options.schedule, (std::vector<testing::Step>{{1, 0.4}}));
   EXPECT_EQ(std::get<Flat>(options.emitter).rings, 8);
@@ -362,21 +363,21 @@ TEST_F(ConfigFiles, ABaseLiesBelowKeyByKey) {
                                 {"a", 1.0}, {"b", std::nullopt}, {"c", 3.0}}));
 }
 
-TEST_F(ConfigFiles, OfSeveralBasesEachLiesOverThoseBeforeIt) {
+TEST_F(ConfigFiles, EachBaseIsMergedOverThoseBeforeIt) {
   Write("sub/shared.yaml", "count: 9\n");
   Write("sub/first.yaml", "base: shared.yaml\nlabel: first\nskull: f.ply\nemitter: flat\n");
   Write("second.yaml", "base: sub/shared.yaml\nlabel: second\nemitter: {type: thesis, decay: 3}\n");
   const Options options = ReadConfig<Options>(
       Write("top.yaml", "base: [sub/first.yaml, second.yaml]\nlast: {level: 3}\n"));
   EXPECT_EQ(options.label, "second");
-  EXPECT_EQ(options.count, 9);  // both may have a base of their own, and the same one
+  EXPECT_EQ(options.count, 9);  // both have the same base
   EXPECT_EQ(options.skull, folder_ / "sub" / "f.ply");
   EXPECT_EQ(options.emitter, decltype(Options::emitter)(Thesis{3}));
   EXPECT_EQ(options.last.level, 3);
 }
 
-// Each file names the next one twice: 2^70 files, if all were read.
-TEST_F(ConfigFiles, BasesAreNotReadWithoutEnd) {
+// Each file names the next file twice, which would be 2^70 files.
+TEST_F(ConfigFiles, TheNumberOfBasesIsLimited) {
   for (int k = 0; k < 70; ++k) {
     Write(fmt::format("{}.yaml", k), fmt::format("base: [{0}.yaml, {0}.yaml]\n", k + 1));
   }
@@ -398,7 +399,7 @@ TEST_F(ConfigFiles, AnotherTypeReplacesAVariantWholly) {
   EXPECT_EQ(std::get<Thesis>(ReadConfig<Options>(more).emitter).decay, 9);
 }
 
-TEST_F(ConfigFiles, BadBasesAreErrorsWithTheirPlace) {
+TEST_F(ConfigFiles, BadBasesAreErrorsWithTheirLocation) {
   const auto a = Write("a.yaml", "base: b.yaml\n");
   Write("b.yaml", "base: a.yaml\n");
   EXPECT_EQ(ErrorsOf(a),
@@ -419,7 +420,7 @@ TEST_F(ConfigFiles, BadBasesAreErrorsWithTheirPlace) {
             (folder_ / "wrong.yaml").string() + ":1:8: count: expected a whole number, found 'x'");
 }
 
-TEST(ConfigSet, ReachesMapsListsAndVariants) {
+TEST(ConfigSet, SetsEntriesOfMapsListsAndVariants) {
   EXPECT_EQ(Set("", {"count=5"}).count, 5);
   EXPECT_EQ(Set("last: {fraction: 0.5}", {"last.level=4"}).last, (testing::Step{4, 0.5}));
   EXPECT_EQ(Set("", {"schedule[1].fraction=0.9"}).schedule,
@@ -437,7 +438,7 @@ TEST(ConfigSet, ReachesMapsListsAndVariants) {
   EXPECT_EQ(Set("", {"count=5", "count=6"}).count, 6);
 }
 
-TEST(ConfigSet, AnotherTypeDropsWhatLowerLayersSayOfTheFormerOne) {
+TEST(ConfigSet, AnotherTypeDropsTheOptionsOfLowerLayers) {
   const auto thesis = [](double decay) { return decltype(Options::emitter)(Thesis{decay}); };
   EXPECT_EQ(Set("", {"emitter.type=thesis"}).emitter, thesis(6));  // the default is flat
   EXPECT_EQ(Set("emitter: {type: flat, rings: 7}", {"emitter.type=thesis"}).emitter, thesis(6));
@@ -448,7 +449,7 @@ TEST(ConfigSet, AnotherTypeDropsWhatLowerLayersSayOfTheFormerOne) {
   EXPECT_EQ(Set(mixed, {"emitter.type=thesis", "emitter.decay=3"}).emitter, thesis(3));
 }
 
-TEST(ConfigSet, AnotherTypeRefusesWhatIsGivenBesideItForTheFormerOne) {
+TEST(ConfigSet, AnotherTypeRefusesOptionsOfTheFormerTypeInTheSameLayer) {
   const auto refused = HasSubstr("--set emitter.rings=4: emitter.rings: unknown key");
   EXPECT_THAT(SetErrors("", {"emitter.rings=4", "emitter.type=thesis"}), refused);
   EXPECT_THAT(SetErrors("emitter: {rings: 7}", {"emitter.type=thesis", "emitter.rings=4"}),
@@ -491,7 +492,7 @@ TEST(ConfigSet, ErrorsNameTheOverride) {
             "--set count=0: count: 0 is out of range; allowed is 1 to 100");
 }
 
-// Values over all bit patterns of doubles and all bytes of texts that YAML can hold.
+// Random values: doubles of all magnitudes, and texts of all bytes that YAML can hold.
 Options RandomOptions(Random& random) {
   const auto number = [&] {
     return std::ldexp(random.Uniform(-1, 1), int(random.Uniform(-1070, 1020)));
@@ -550,7 +551,7 @@ TEST(ConfigWrite, RefusesNumbersThatAreNotFinite) {
   }
 }
 
-TEST(ConfigTree, SetPathTakesWholeTreesAndLeavesTheTreeAloneOnFailure) {
+TEST(ConfigTree, SetPathSetsWholeTreesAndChangesNothingOnFailure) {
   ConfigNode tree = ConfigNode::Map();
   SetPath(tree, "a.b", ConfigNode::Scalar("1"));
   ConfigNode more = ConfigNode::Map();
@@ -561,7 +562,7 @@ TEST(ConfigTree, SetPathTakesWholeTreesAndLeavesTheTreeAloneOnFailure) {
   EXPECT_EQ(ToFlowYaml(tree), "{a: {b: 1, c: 2}}");
 }
 
-TEST(OptionsReference, TellsTypeDefaultRangeUnitAndMeaning) {
+TEST(OptionsReference, HasTypeDefaultRangeUnitAndMeaning) {
   const std::string text = OptionsReference<Options>();
   EXPECT_THAT(text, HasSubstr("radius_mm: number, default 2.5, 0 to 10 mm\n    of the sphere\n"));
   EXPECT_THAT(text, HasSubstr("sex: one of male, female, default male\n"));
@@ -585,7 +586,7 @@ void Fields(Visitor& visit, Outer& o) {
   visit(FieldInfo{.name = "emitter"}, o.emitter);
 }
 
-TEST(OptionsReference, StatesTheDefaultsOfTheStructAround) {
+TEST(OptionsReference, HasTheDefaultsOfTheSurroundingStruct) {
   const std::string text = OptionsReference<Outer>();
   EXPECT_THAT(text, HasSubstr("step.level: whole number, default 3, 0 to 6\n"));
   EXPECT_THAT(text, HasSubstr("emitter.decay (type: thesis): number, default 9, 0.5 to 50\n"));
@@ -594,7 +595,7 @@ TEST(OptionsReference, StatesTheDefaultsOfTheStructAround) {
   EXPECT_EQ(std::get<Thesis>(read).decay, 9);
 }
 
-// Every path of a schema, written as the reference writes it.
+// Collects every path of a schema in the form of the reference.
 void CollectPaths(const nlohmann::json& schema, const std::string& path,
                   std::set<std::string>& out) {
   const nlohmann::json properties = schema.value("properties", nlohmann::json::object());

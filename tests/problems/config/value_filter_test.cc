@@ -56,7 +56,7 @@ TEST(ValueFilter, NotBindsCloserThanAndAndAndCloserThanOr) {
   }
 }
 
-TEST(ValueFilter, OfSeveralValuesOneIsEnoughAndNoneMayBeEqualForUnequal) {
+TEST(ValueFilter, ComparesWithEachOfSeveralValues) {
   EXPECT_TRUE(Holds("tag = real", kTrial));
   EXPECT_FALSE(Holds("tag != real", kTrial));
   EXPECT_TRUE(Holds("tag != broken", kTrial));
@@ -64,7 +64,7 @@ TEST(ValueFilter, OfSeveralValuesOneIsEnoughAndNoneMayBeEqualForUnequal) {
   EXPECT_TRUE(Holds("tag != odd", {}));
 }
 
-TEST(ValueFilter, SaysWhereAConditionIsNone) {
+TEST(ValueFilter, ReportsThePlaceOfAFault) {
   EXPECT_THAT(Refusal("subjct = a"), HasSubstr("unknown name 'subjct'; did you mean 'subject'?"));
   EXPECT_THAT(Refusal("weight = 1"), HasSubstr("ambiguous name 'weight'"));
   EXPECT_THAT(Refusal("subject = a interp = b"), HasSubstr("at 'interp = b'"));

@@ -108,7 +108,7 @@ TEST_F(StudyPlanTest, SobolSamplesAreEvenInEachHalfOfARange) {
   EXPECT_EQ(low, 7);
 }
 
-TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
+TEST_F(StudyPlanTest, EveryFaultIsReportedOnceWithItsLine) {
   EXPECT_THAT(Faults("subjects: [{name: a}, {name: b}]\ngrid:\n  interp: [nearest, krigging]\n"),
               AllOf(HasSubstr("study.yaml:6:21: interp"), HasSubstr("krigging")));
   const std::string twice = Faults(
@@ -128,7 +128,7 @@ TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
               HasSubstr("base: the file of an experiment is missing"));
 }
 
-TEST_F(StudyPlanTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorIfNot) {
+TEST_F(StudyPlanTest, ASubjectWithMissingFilesIsSkippedIfOptionalElseAnError) {
   const std::string missing =
       "subjects: [{name: a}, {name: b, set: {subject: {type: files, skull: none.ply, landmarks: "
       "none.yaml}}";
@@ -138,7 +138,7 @@ TEST_F(StudyPlanTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorI
   EXPECT_THAT(Faults(missing + "}]\n"), HasSubstr("subject b: no such file"));
 }
 
-TEST_F(StudyPlanTest, WithoutSubjectsItIsAFaultOrForWhoOnlyLooksANote) {
+TEST_F(StudyPlanTest, NoSubjectIsAFaultOrForCheckANote) {
   const std::string text =
       "subjects: [{name: b, optional: true, set: {subject: {type: files, skull: none.ply, "
       "landmarks: none.yaml}}}]\n";
@@ -151,7 +151,7 @@ TEST_F(StudyPlanTest, WithoutSubjectsItIsAFaultOrForWhoOnlyLooksANote) {
                ConfigError);
 }
 
-TEST_F(StudyPlanTest, ASearchIsRefusedWithWhatReplacesIt) {
+TEST_F(StudyPlanTest, ASearchIsRefusedAndItsReplacementIsNamed) {
   EXPECT_EQ(Faults("subjects: [{name: a}]\nsearch: {budget: 4}\n"),
             (folder_ / "study.yaml").string() +
                 ":5:9: search: removed in 1.0; use Optuna, as docs/examples/search_with_optuna.py "
@@ -178,7 +178,7 @@ TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {
               HasSubstr("study.yaml:4:1: set: the key appears twice"));
 }
 
-TEST_F(StudyPlanTest, FaultsOfKeepMetricAndAxesAreToldTogetherAndOnce) {
+TEST_F(StudyPlanTest, FaultsOfKeepMetricAndAxesAreReportedTogetherAndOnce) {
   const std::string words = Faults(
       "subjects: [{name: a}, {name: b, set: {subject.random_seed: 2}}]\n"
       "grid:\n  interp: [nearest, krigging]\n  rounds: [1, 2000]\nkeep: all\nmetric: "
@@ -190,7 +190,7 @@ TEST_F(StudyPlanTest, FaultsOfKeepMetricAndAxesAreToldTogetherAndOnce) {
   EXPECT_EQ(std::count(words.begin(), words.end(), '\n'), 3) << words;
 }
 
-TEST_F(StudyPlanTest, AMetricMustBeOneThatTheJobAndTheSubjectsHave) {
+TEST_F(StudyPlanTest, TheJobAndTheSubjectsMustHaveTheMetric) {
   EXPECT_THAT(Faults("metric: face.rms_mm\njob: depth\n"), HasSubstr("no trial of job: depth"));
   EXPECT_NO_THROW(Plan("metric: cross_validation.landmark.sites.g\njob: depth\n"));
   EXPECT_NO_THROW(Plan("metric: cross_validation.side.sites.go_l\njob: depth\n"));
@@ -214,7 +214,7 @@ TEST_F(StudyPlanTest, AMetricMustBeOneThatTheJobAndTheSubjectsHave) {
               HasSubstr("measured against the true skin, which no subject has"));
 }
 
-TEST_F(StudyPlanTest, AConditionChoosesTrialsBySubjectTagAndAxes) {
+TEST_F(StudyPlanTest, AConditionSelectsTrialsBySubjectTagAndAxes) {
   const StudyPlan plan = Plan(
       "subjects: [{name: a, tags: [odd]}, {name: b, tags: [even, big], set: {subject.random_seed: "
       "7}}]\ngrid: {interp: [nearest, mean], rounds: [1, 2, 10]}\n");
@@ -229,7 +229,7 @@ TEST_F(StudyPlanTest, AConditionChoosesTrialsBySubjectTagAndAxes) {
   EXPECT_EQ(count("id = " + plan.trials[3].id), 1);
 }
 
-TEST_F(StudyPlanTest, AnAxisOfTypesTakesEachWithItsOwnDefaults) {
+TEST_F(StudyPlanTest, EachTypeOfAnAxisHasItsOwnDefaults) {
   const StudyPlan plan = Plan("grid: {interp.type: [network_spline, natural_neighbour]}\n");
   ASSERT_EQ(plan.trials.size(), 2u);
   EXPECT_TRUE(std::holds_alternative<NaturalNeighbour>(plan.trials[1].experiment.interp));

@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ScratchFolder;
 
-TEST(StudyEta, SaysRateAndTimeLeftOfWhatWasDoneHere) {
+TEST(StudyEta, HasRateAndRemainingTimeFromTheTrialsOfThisCall) {
   EXPECT_EQ(EtaText({.trials = 80, .finished = 30, .finished_before = 20, .elapsed_s = 40}),
             "30 of 80 trials, 4.0 s each, about 3 min left");
   EXPECT_EQ(EtaText({.trials = 80, .finished = 21, .finished_before = 1, .elapsed_s = 4}),
@@ -35,7 +35,7 @@ TEST(StudyEta, TheBarFillsFromEmptyToFull) {
   EXPECT_EQ(BarText({.trials = 0}, 4), "[####]");
 }
 
-TEST(StudyProgress, OffATerminalSaysFailuresAndTheEndAndLittleElse) {
+TEST(StudyProgress, WithoutATerminalPrintsFailuresAndTheEnd) {
   const ScratchFolder folder;
   std::FILE* file = std::fopen((folder / "log").c_str(), "w");
   StudyProgress progress(file, std::chrono::hours(1));

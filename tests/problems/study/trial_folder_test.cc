@@ -45,7 +45,7 @@ class TrialFolders : public ::testing::Test {
   }
   void WriteTrial(const nlohmann::ordered_json& json) const { Write("trial.json", json.dump()); }
   std::string Copy() const { return CopyTrial(folder_ / "from", folder_ / "to", "a"); }
-  // Refused, and nothing has come to where it should go.
+  // The copy is refused and writes nothing.
   void ExpectNotTaken(const std::string& words) const {
     EXPECT_THAT(Copy(), HasSubstr(words));
     EXPECT_FALSE(fs::exists(To()));
@@ -54,7 +54,7 @@ class TrialFolders : public ::testing::Test {
   testing::ScratchFolder folder_;
 };
 
-TEST_F(TrialFolders, AWholeTrialIsCopiedWhole) {
+TEST_F(TrialFolders, AWholeTrialIsCopiedCompletely) {
   EXPECT_THAT(Copy(), IsEmpty());
   for (const char* name : {"face.ply", "pictures/front.png", "timing.json", "trial.json"}) {
     EXPECT_EQ(ReadFileBytes(To() / name), ReadFileBytes(From() / name)) << name;
@@ -62,14 +62,14 @@ TEST_F(TrialFolders, AWholeTrialIsCopiedWhole) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "to/trials"), {}), 1);
 }
 
-TEST_F(TrialFolders, AFileThatIsMissingOrChangedIsFound) {
+TEST_F(TrialFolders, AMissingOrChangedFileIsFound) {
   Write("face.ply", "mesj");
   ExpectNotTaken("face.ply is not what was written");
   fs::remove(From() / "face.ply");
   ExpectNotTaken("face.ply is missing");
 }
 
-TEST_F(TrialFolders, TheManifestOfARunCountsToo) {
+TEST_F(TrialFolders, TheManifestOfARunIsCheckedToo) {
   WriteTrial({{"id", "a"}, {"status", "done"}});
   nlohmann::ordered_json manifest;
   manifest["outputs"] = ListHashes(From(), {"face.ply"});
@@ -100,7 +100,7 @@ TEST_F(TrialFolders, NoLinkIsFollowedOutOfATrial) {
   ExpectNotTaken("it is a link");
 }
 
-TEST_F(TrialFolders, WhatIsNotWholeIsNotATrial) {
+TEST_F(TrialFolders, AnIncompleteTrialDoesNotExist) {
   for (const char* text : {"", "{", "[]", "{\"id\": \"b\"}", "{\"id\": 1}",
                            "{\"id\": \"a\", \"status\": 3}", "{\"id\": \"a\", \"reason\": []}"}) {
     Write("trial.json", text);
@@ -109,7 +109,7 @@ TEST_F(TrialFolders, WhatIsNotWholeIsNotATrial) {
   }
 }
 
-TEST_F(TrialFolders, WhatABrokenTrialHasLeftIsReplacedAndOtherFilesStay) {
+TEST_F(TrialFolders, FilesOfABrokenTrialAreReplacedAndOtherFilesStay) {
   fs::create_directories(To());
   WriteFileAtomically(To() / "trial.json", "{");
   WriteFileAtomically(To() / "mine.txt", "mine");
@@ -118,7 +118,7 @@ TEST_F(TrialFolders, WhatABrokenTrialHasLeftIsReplacedAndOtherFilesStay) {
   EXPECT_EQ(ReadFileBytes(To() / "mine.txt"), "mine");
 }
 
-TEST_F(TrialFolders, APlanIsOfAStudyOrAnError) {
+TEST_F(TrialFolders, AFileThatIsNotAPlanIsAnError) {
   EXPECT_EQ(ReadPlanHash(folder_ / "from"), "");
   const fs::path file = folder_ / "from/plan.json";
   for (const char* text : {"", "{", "[]", "{}", "{\"hash\": 7}"}) {
@@ -129,7 +129,7 @@ TEST_F(TrialFolders, APlanIsOfAStudyOrAnError) {
   EXPECT_EQ(ReadPlanHash(folder_ / "from"), "h");
 }
 
-// The same by way of a tree.
+// Collects the same numbers from a JSON tree.
 void AddNumbers(const Json& json, const std::string& path, std::map<std::string, double>& numbers) {
   if (json.is_number()) {
     numbers[path] = json.get<double>();
@@ -140,7 +140,7 @@ void AddNumbers(const Json& json, const std::string& path, std::map<std::string,
   }
 }
 
-TEST(TrialNumbers, AreThoseOfTheTree) {
+TEST(TrialNumbers, EqualThoseOfTheTree) {
   const std::string text = R"({"id": "a1", "status": "done", "axes": {"x": "1", "status": "no"},
     "result": {"n": 3, "low": -2, "null": null, "text": "x", "flag": true, "face":
     {"rms_mm": 1.5, "quantiles_mm": [0.5, null, 1e-3], "id": "b"},
@@ -160,7 +160,7 @@ TEST(TrialNumbers, AreThoseOfTheTree) {
                           Pair("fit.levels.rms", ElementsAre(3, 2))));
 }
 
-TEST(TrialNumbers, OfWhatIsNoTrialThereAreNone) {
+TEST(TrialNumbers, AreMissingForATextThatIsNotATrial) {
   const std::string deep = R"({"id": "a", "result": )" + std::string(kDeepestJson, '[') +
                            std::string(kDeepestJson, ']') + "}";
   for (const std::string& text :
