@@ -190,9 +190,9 @@ class TreeBuilder : public YAML::EventHandler {
 
   void Open(const YAML::Mark& mark, const std::string& tag, ConfigNode::Kind kind,
             YAML::EmitterStyle::value style) {
-    if (levels_.size() >= kDeepestConfig) {
+    if (levels_.size() >= kMaxConfigDepth) {
       throw YAML::Exception(
-          mark, fmt::format("more than {} levels of nested maps and lists", kDeepestConfig));
+          mark, fmt::format("more than {} levels of nested maps and lists", kMaxConfigDepth));
     }
     RefuseTag(mark, tag);
     levels_.push_back({.node = At(mark), .is_flow = style == YAML::EmitterStyle::Flow});
@@ -232,11 +232,11 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   void TakeKey(Level& level, const ConfigNode& node) {
-    if (++level.keys > kMostKeys) {
+    if (++level.keys > kMaxKeys) {
       YAML::Mark mark;
       mark.line = node.location.line - 1;
       mark.column = node.location.column - 1;
-      throw YAML::Exception(mark, fmt::format("more than {} entries in one map", kMostKeys));
+      throw YAML::Exception(mark, fmt::format("more than {} entries in one map", kMaxKeys));
     }
     level.is_key_good = node.IsScalar();
     level.key = node.text;
@@ -310,8 +310,8 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
   if (std::find(loading.chain.begin(), loading.chain.end(), canonical) != loading.chain.end()) {
     return fail(fmt::format("'{}' would be its own base", base.text));
   }
-  if (loading.next_order > static_cast<int>(kDeepestConfig)) {
-    return fail(fmt::format("more than {} bases, including bases of bases", kDeepestConfig));
+  if (loading.next_order > static_cast<int>(kMaxConfigDepth)) {
+    return fail(fmt::format("more than {} bases, including bases of bases", kMaxConfigDepth));
   }
   std::string text;
   try {

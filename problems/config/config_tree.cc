@@ -63,9 +63,9 @@ std::vector<Step> ParsePath(std::string_view path) {
       FailMalformed(path);
     }
     steps.push_back(TakeStep(path, at));
-    if (steps.size() > kDeepestConfig) {
+    if (steps.size() > kMaxConfigDepth) {
       throw ConfigError(fmt::format("{}...: a path of more than {} steps leads nowhere",
-                                    path.substr(0, 40), kDeepestConfig));
+                                    path.substr(0, 40), kMaxConfigDepth));
     }
   } while (at < path.size());
   return steps;

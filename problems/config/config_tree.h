@@ -17,9 +17,9 @@ namespace semblance {
 // Limits against hostile files, far above what real files need. They bound recursion, which must
 // fit the stack: levels of nested maps and lists, steps of a path, and bases including their own
 // bases.
-inline constexpr std::size_t kDeepestConfig = 64;
+inline constexpr std::size_t kMaxConfigDepth = 64;
 // Keys of one map. The search for a key is linear, so many keys would take quadratic time.
-inline constexpr int kMostKeys = 10'000;
+inline constexpr int kMaxKeys = 10'000;
 inline constexpr std::size_t kLargestConfig_bytes = 16'000'000;
 
 // The file or override that a tree was read from.
