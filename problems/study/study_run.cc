@@ -59,8 +59,8 @@
 //        fault in writing the folder ends the whole queue (broken_), because no other trial could
 //        be written.
 //  (10)  plan.json is written before the first trial runs. It lists the trials for tables and
-//        merges. The queue reads it only to refuse the folder of another study and to count left-
-//        over trials.
+//        merges. The queue reads it only to refuse the folder of another study and to count the
+//        trials that are left over.
 #include "problems/study/study_run.h"
 
 #include <fmt/format.h>
@@ -157,6 +157,8 @@ class StudyRunner {
         folder_(std::move(folder)),
         options_(options),
         context_(context),
+        // A trial uses up to 8 stages, and trials share most of them. A larger capacity takes more
+        // memory; a smaller one makes stages again when trials of several subjects alternate.
         cache_(4 * options.jobs + 6, OpenDiskCache(options)) {}
 
   // Runs the queue of this shard.
