@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The declared commands as data, for what is written of them.
+// The declared commands as data: for completions and the manual page (shell_completion.h), and to
+// name the word of a command line that is wrong.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -12,9 +14,9 @@ class App;
 namespace semblance {
 
 struct OptionText {
-  std::vector<std::string> names;         // with their dashes; of a positional its one name
-  std::string value;                      // what it takes, e.g. TEXT; empty: a flag
-  std::vector<std::string> choices = {};  // the words that it takes, where it takes no others
+  std::vector<std::string> names;         // with dashes; a positional argument has one name
+  std::string value;                      // kind of its value, e.g. TEXT; empty for a flag
+  std::vector<std::string> choices = {};  // the allowed words; empty if any text is allowed
   std::string purpose;
   bool positional = false;
 };
@@ -26,11 +28,15 @@ struct CommandNode {
   std::vector<CommandNode> commands;
 };
 
-// Of a command and all below it, in the order in which they were declared.
+// Describes a command and all commands below it, in the order of their declaration.
 CommandNode TreeOf(const CLI::App& app);
 
-// After a line was read: the first option that it gives an empty value, in a sentence; empty where
-// there is none. A shell makes such a line of a variable that is not set.
+// Returns a sentence about the first option that has an empty value after parsing, or "" if there
+// is none. A shell produces such a command line from an unset variable.
 std::string OptionWithoutValue(const CLI::App& app);
+
+// Returns a sentence about the first unknown command or option of a refused command line, with the
+// nearest known word, or "" if all words are known. `words` excludes the program's name.
+std::string UnknownWord(const CommandNode& program, std::span<const std::string> words);
 
 }  // namespace semblance

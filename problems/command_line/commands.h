@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands of the program as data: each room of commands has one table, and main.cc declares
-// what the tables say. `semblance --help` lists them in this order.
+// The commands of the program as data: each file of commands has one table, and main.cc declares
+// the commands of all tables. `semblance --help` lists them in this order.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -17,20 +17,20 @@
 
 namespace semblance {
 
-// What a declared command has to do with the rest of the program.
+// The connection between a declared command and the rest of the program.
 struct CommandLine {
   std::stop_token stop;         // set by Ctrl-C; a long command ends early then
-  std::function<int()> chosen;  // set by the command that stands on the line; returns the exit code
+  std::function<int()> chosen;  // set by the command on the line; returns the exit code
 };
 
 struct ProgramCommand {
   const char* name;
   const char* purpose;  // one line, for --help
-  // Adds the options, and sees to it that `line.chosen` is set.
+  // Adds the options of the command. Parsing the command must then set `line.chosen`.
   void (*declare)(CLI::App& command, CommandLine& line);
 };
 
-// For options that take a number: not nan, not inf, which ranges let pass.
+// Validates a number: refuses nan and inf, which CLI::Range accepts.
 inline CLI::Validator Finite() {
   return {[](std::string& text) -> std::string {
             double number = 0;
@@ -41,8 +41,8 @@ inline CLI::Validator Finite() {
           ""};
 }
 
-// For options that take a whole number from 0 on: CLI11 would read -1 as the largest one, and 010
-// as eight.
+// Validates a whole number from 0 on. CLI11 alone would read -1 as the largest number and 010 as
+// eight.
 inline CLI::Validator WholeNumber() {
   return {[](std::string& text) -> std::string {
             std::uint64_t number = 0;
@@ -55,7 +55,8 @@ inline CLI::Validator WholeNumber() {
           ""};
 }
 
-// What the user types goes into the Arguments returned; `run` gets them once all are parsed.
+// Returns Arguments for the options of a command to write to. If the command is chosen, `run` gets
+// them after the whole line is parsed.
 template <class Arguments>
 std::shared_ptr<Arguments> Bind(CLI::App& command, CommandLine& line,
                                 int (*run)(const Arguments&)) {

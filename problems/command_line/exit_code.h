@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the program tells the shell.
+// The exit codes of the program.
 #pragma once
 
 namespace semblance {

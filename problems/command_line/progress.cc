@@ -26,9 +26,9 @@ ProgressPrinter::ProgressPrinter(std::FILE* stream, std::chrono::milliseconds in
 
 void ProgressPrinter::operator()(const Event& event) {
   const Clock::time_point now = Clock::now();
-  const bool said_enough = event.step == last_step_ && event.message.empty() &&
+  const bool is_too_soon = event.step == last_step_ && event.message.empty() &&
                            now - last_ < interval_ && !(event.fraction >= 1);
-  if (said_enough) {
+  if (is_too_soon) {
     return;
   }
   last_step_ = event.step;

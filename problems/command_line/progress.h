@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What people see while a long step runs.
+// Progress lines of a long step on the terminal.
 #pragma once
 
 #include <chrono>
@@ -10,8 +10,8 @@
 
 namespace semblance {
 
-// Prints events as lines to a stream: the first and last of each step, and between them at most one
-// every `interval`.
+// Prints events as lines to a stream: the first and last event of each step, and at most one per
+// `interval` between them.
 class ProgressPrinter {
  public:
   explicit ProgressPrinter(std::FILE* stream,

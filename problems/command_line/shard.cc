@@ -12,8 +12,8 @@
 namespace semblance {
 namespace {
 
-// Whether all of `text` is "I/N".
-bool Read(const std::string& text, Shard& shard) {
+// Returns true if the whole `text` is "I/N".
+bool ReadShard(const std::string& text, Shard& shard) {
   const char* const end = text.data() + text.size();
   const auto [slash, fault] = std::from_chars(text.data(), end, shard.index);
   if (fault != std::errc() || slash == end || *slash != '/') {
@@ -31,7 +31,7 @@ Shard ShardOf(const std::string& text) {
   const std::string given =
       text.empty() && index && count ? fmt::format("{}/{}", index, count) : text;
   Shard shard;
-  if (!(given.empty() || Read(given, shard)) || shard.count < 1 || shard.index < 0 ||
+  if (!(given.empty() || ReadShard(given, shard)) || shard.count < 1 || shard.index < 0 ||
       shard.index >= shard.count) {
     throw InputError(fmt::format("--shard {}: write I/N with 0 <= I < N, e.g. 0/4", given));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which part of some work a process does: every N-th piece from the I-th.
+// The part of some work that one process does: every count-th piece, from piece `index` (from 0).
 #pragma once
 
 #include <string>
@@ -10,8 +10,9 @@ struct Shard {
   int index = 0, count = 1;
 };
 
-// "I/N" with 0 <= I < N; for an empty text what Slurm says of an array of jobs
-// (SLURM_ARRAY_TASK_ID, _COUNT), else all. Throws InputError for anything else.
+// Reads "I/N" with 0 <= I < N. For an empty text, takes Slurm's variables of an array of jobs
+// (SLURM_ARRAY_TASK_ID and _COUNT), or all work if they are not set. Throws InputError for any
+// other text.
 Shard ShardOf(const std::string& text);
 
 }  // namespace semblance

@@ -11,7 +11,7 @@
 namespace semblance {
 namespace {
 
-// Each command, with the words that lead to it: "landmarks convert".
+// Calls `use` for each command, with the words that lead to it: "landmarks convert".
 void ForEachCommand(const CommandNode& node, const std::string& path,
                     const std::function<void(const CommandNode&, const std::string&)>& use) {
   use(node, path);
@@ -20,13 +20,13 @@ void ForEachCommand(const CommandNode& node, const std::string& path,
   }
 }
 
-// A word that may follow, and what it is.
+// A word that may follow, and its meaning.
 struct NextWord {
   std::string word;
   std::string purpose;
 };
 
-// Commands, words of a positional that takes no others, options.
+// Collects the words that may follow a command: commands, allowed words of a positional, options.
 std::vector<NextWord> WordsAfter(const CommandNode& node) {
   std::vector<NextWord> words;
   for (const CommandNode& below : node.commands) {
@@ -48,7 +48,7 @@ std::string BashList(const std::vector<NextWord>& words) {
   return QuotedForShell(list);
 }
 
-// Of `word:what it is`.
+// Writes a zsh array with entries `word:purpose`.
 std::string ZshList(const std::vector<NextWord>& words) {
   std::string list = "(";
   for (const NextWord& next : words) {
@@ -57,12 +57,11 @@ std::string ZshList(const std::vector<NextWord>& words) {
   return list + ")";
 }
 
-// The shell's cases: how words lead from one command to the next; what may follow a command; what
-// an option takes: words, or, where it names none, files.
+// Branches of the script's `case` statements.
 struct Cases {
-  std::string steps;
-  std::string words;
-  std::string values;
+  std::string steps;   // from a command and the next word to the next command
+  std::string words;   // from a command to the words that may follow
+  std::string values;  // from an option to its allowed words, or to "files" if any text is allowed
 };
 
 void AddValues(const CommandNode& node, const std::string& path, std::string& values) {
@@ -77,8 +76,8 @@ void AddValues(const CommandNode& node, const std::string& path, std::string& va
   }
 }
 
-Cases CasesOf(const CommandNode& program,
-              const std::function<std::string(const std::vector<NextWord>&)>& list) {
+Cases MakeCases(const CommandNode& program,
+                const std::function<std::string(const std::vector<NextWord>&)>& list) {
   Cases cases;
   ForEachCommand(program, "", [&](const CommandNode& node, const std::string& path) {
     cases.words +=
@@ -93,7 +92,7 @@ Cases CasesOf(const CommandNode& program,
   return cases;
 }
 
-// One option of fish; what it takes are words, else files.
+// Describes an option for fish, with its allowed words, or with files if any text is allowed.
 std::string FishOption(const OptionText& option) {
   std::string text;
   for (const std::string& name : option.names) {
@@ -105,10 +104,54 @@ std::string FishOption(const OptionText& option) {
   return text + (option.value.empty() ? "" : " -r");
 }
 
+// Escapes a text for troff: backslashes, dots and quotes at the start of a line, and dashes, which
+// troff would print as hyphens that cannot be copied to a shell.
+std::string EscapeTroff(const std::string& text) {
+  std::string escaped;
+  for (const char c : text) {
+    if (c == '\\') {
+      escaped += "\\e";
+    } else if (c == '-') {
+      escaped += "\\-";
+    } else if ((c == '.' || c == '\'') && (escaped.empty() || escaped.back() == '\n')) {
+      escaped += fmt::format("\\&{}", c);
+    } else {
+      escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string OptionEntry(const OptionText& option) {
+  std::string names;
+  for (const std::string& name : option.names) {
+    names += fmt::format("{}\\fB{}\\fR", names.empty() ? "" : ", ", EscapeTroff(name));
+  }
+  const std::string value = option.value.empty() ? "" : fmt::format(" \\fI{}\\fR", option.value);
+  return fmt::format(".TP\n{}{}\n{}\n", names, value, EscapeTroff(option.purpose));
+}
+
+std::string CommandEntry(const CommandNode& command, const std::string& before) {
+  const std::string name = before + command.name;
+  std::string positionals;
+  for (const OptionText& option : command.options) {
+    positionals += option.positional ? " " + option.names.front() : "";
+  }
+  std::string text = fmt::format(".SS {}{}\n{}.\n", EscapeTroff(name), EscapeTroff(positionals),
+                                 EscapeTroff(command.purpose));
+  for (const OptionText& option : command.options) {
+    text += OptionEntry(option);
+  }
+  for (const CommandNode& below : command.commands) {
+    text += CommandEntry(below, name + " ");
+  }
+  return text;
+}
+
 }  // namespace
 
 std::string BashCompletion(const CommandNode& program) {
-  const Cases cases = CasesOf(program, &BashList);
+  const Cases cases = MakeCases(program, &BashList);
   return fmt::format(
       R"(# bash completion of {0}
 _{0}() {{
@@ -136,7 +179,7 @@ complete -o filenames -F _{0} {0}
 }
 
 std::string ZshCompletion(const CommandNode& program) {
-  const Cases cases = CasesOf(program, &ZshList);
+  const Cases cases = MakeCases(program, &ZshList);
   return fmt::format(
       R"(#compdef {0}
 _{0}() {{
@@ -160,7 +203,7 @@ _{0}() {{
     [[ -z $at || $PREFIX == -* ]] || _files
   fi
 }}
-# Read by zsh's own loader, it is asked at once; sourced, it is only made known.
+# zsh's own loader calls the function at once; a sourced file only registers it.
 if [[ "${{funcstack[1]}}" == _{0} ]]; then
   _{0} "$@"
 else
@@ -205,6 +248,21 @@ end
 complete -c {0} -n '__{0}_at ""' -f
 {2})",
       program.name, steps, lines);
+}
+
+std::string ManualPage(const CommandNode& program) {
+  std::string text = fmt::format(
+      ".TH SEMBLANCE 1 \"\" \"semblance {}\" \"User Commands\"\n.SH NAME\nsemblance \\- face from "
+      "skull, and a bench on which the ways of doing so are compared\n.SH SYNOPSIS\n.B "
+      "semblance\n\\fICOMMAND\\fR [\\fIOPTION\\fR]...\n.SH DESCRIPTION\n{}\n.SH COMMANDS\n",
+      SEMBLANCE_VERSION, EscapeTroff(program.purpose));
+  for (const CommandNode& command : program.commands) {
+    text += CommandEntry(command, "");
+  }
+  text +=
+      ".SH EXIT STATUS\n.TP\n0\ndone\n.TP\n1\nran, but the result is not usable\n.TP\n2\nbad "
+      "input\n.SH SEE ALSO\n\\fBsemblance options\\fR prints every option of a configuration.\n";
+  return text;
 }
 
 }  // namespace semblance

@@ -49,7 +49,7 @@ std::vector<std::string> ShortNames(const std::vector<fs::path>& folders) {
 std::set<std::string> SubjectsWith(const NamedStudy& study, const std::string& metric) {
   std::set<std::string> subjects;
   for (const TrialRow& row : study.results.trials) {
-    if (row.status == "done" && !row.aside && row.metrics.contains(metric)) {
+    if (row.status == "done" && row.metrics.contains(metric)) {
       subjects.insert(row.subject);
     }
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The only file that knows yaml-cpp. It listens to the parser's events rather than load nodes,
-// because nodes have lost repeated keys, anchors and tags already.
+// The only file that includes yaml-cpp. It handles the parser's events instead of loading
+// YAML::Node, because a YAML::Node no longer shows repeated keys, anchors and tags.
 #include "problems/config/config.h"
 
 #include <fmt/format.h>
@@ -14,7 +14,7 @@
 #include <sstream>
 #include <vector>
 
-#include "problems/config/config_limits.h"
+#include "problems/config/config_tree.h"
 #include "problems/config/utf8_check.h"
 #include "surfaces/base/atomic_file.h"
 
@@ -27,22 +27,22 @@ ConfigLocation LocationAt(const SourcePtr& source, const YAML::Mark& mark) {
   return {source, std::max(mark.line, 0) + 1, std::max(mark.column, 0) + 1};
 }
 
-// What is left of a text that cannot be read: what is missed in it is missed there.
+// Placeholder for an unreadable text. Missing keys are reported at its start.
 ConfigNode EmptyMap(const SourcePtr& source) {
   ConfigNode map = ConfigNode::Map();
   map.location = {source, 1, 1};
   return map;
 }
 
-ConfigLocation EndOf(std::string_view text, const SourcePtr& source) {
+ConfigLocation EndLocation(std::string_view text, const SourcePtr& source) {
   const auto lines = std::count(text.begin(), text.end(), '\n');
   const std::size_t last_break = text.rfind('\n');
   const std::size_t line_begin = last_break == text.npos ? 0 : last_break + 1;
   return {source, static_cast<int>(lines) + 1, static_cast<int>(text.size() - line_begin) + 1};
 }
 
-// The lines of a text as the parser counts them: from 0, and without a mark of byte order.
-std::vector<std::string_view> LinesOf(std::string_view text) {
+// Splits a text into lines as the parser counts them: from 0, without a byte order mark.
+std::vector<std::string_view> SplitLines(std::string_view text) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";
   if (text.starts_with(kByteOrderMark)) {
     text.remove_prefix(kByteOrderMark.size());
@@ -56,20 +56,20 @@ std::vector<std::string_view> LinesOf(std::string_view text) {
   return lines;
 }
 
-// What follows a location in its line.
+// The rest of the line from `mark` on.
 std::string_view LineFrom(std::span<const std::string_view> lines, const YAML::Mark& mark) {
   const auto line = static_cast<std::size_t>(std::max(mark.line, 0));
   const std::string_view text = line < lines.size() ? lines[line] : std::string_view();
   return text.substr(std::min<std::size_t>(std::max(mark.column, 0), text.size()));
 }
 
-// Of a line that begins with a quote: whether the quote ends in it.
+// Returns true if the quote at the start of `line` is closed within the line.
 bool ClosesQuote(std::string_view line) {
   const char quote = line.front();
   for (std::size_t k = 1; k < line.size(); ++k) {
-    const bool escapes = quote == '"' && line[k] == '\\';  // what follows closes nothing
-    const bool stands_for_one = quote == '\'' && line.substr(k).starts_with("''");
-    if (escapes || stands_for_one) {
+    const bool escapes = quote == '"' && line[k] == '\\';  // the next character closes nothing
+    const bool is_doubled = quote == '\'' && line.substr(k).starts_with("''");
+    if (escapes || is_doubled) {
       ++k;
     } else if (line[k] == quote) {
       return true;
@@ -78,11 +78,11 @@ bool ClosesQuote(std::string_view line) {
   return false;
 }
 
-// Builds the tree of the first document, and complains about all that the tree cannot hold.
+// Builds the tree of the first document. Adds an error for everything that a tree cannot represent.
 class TreeBuilder : public YAML::EventHandler {
  public:
   TreeBuilder(std::string_view text, SourcePtr source, ConfigErrors& errors)
-      : lines_(LinesOf(text)), source_(std::move(source)), errors_(errors) {
+      : lines_(SplitLines(text)), source_(std::move(source)), errors_(errors) {
     root_.location = {source_, 1, 1};
   }
 
@@ -130,11 +130,11 @@ class TreeBuilder : public YAML::EventHandler {
   void OnMapEnd() override { Close(); }
 
  private:
-  // A map or list that is not closed yet; for a map also the key that waits for its value.
+  // A map or list that is still open, and for a map the key whose value comes next.
   struct Level {
     ConfigNode node;
     bool is_flow = false;
-    int keys = 0;  // so far, good or not
+    int keys = 0;  // keys read so far, valid or not
     bool has_key = false;
     bool is_key_good = false;
     std::string key = {};
@@ -171,29 +171,28 @@ class TreeBuilder : public YAML::EventHandler {
     }
   }
 
-  // A text that goes on over the end of its line: mostly a quote or a bracket that somebody forgot
-  // to close, and which then swallows the options that follow.
+  // Refuses a text that continues on the next line. Most such texts come from a quote or bracket
+  // that was not closed, and would swallow the options that follow.
   void RefuseSeveralLines(const YAML::Mark& mark, const std::string& value) {
     const std::string_view line = LineFrom(lines_, mark);
     const bool is_quoted = line.starts_with('"') || line.starts_with('\'');
     const bool is_flow = !levels_.empty() && levels_.back().is_flow;
     if (is_quoted && !ClosesQuote(line)) {
       AddError(mark,
-               "the quote that begins here is not closed in its line; close it (a text of "
-               "several lines is written as a block, after |)");
+               "the quote that begins here is not closed in its line; close it (write a text of "
+               "several lines as a block, after |)");
     } else if (!is_quoted && is_flow && !line.starts_with(value)) {
       AddError(mark,
-               "a text within brackets goes on in the next line; is a comma or a bracket "
+               "a text within brackets continues on the next line; is a comma or a bracket "
                "missing?");
     }
   }
 
   void Open(const YAML::Mark& mark, const std::string& tag, ConfigNode::Kind kind,
             YAML::EmitterStyle::value style) {
-    if (levels_.size() >= kDeepestConfig) {
-      throw YAML::Exception(mark, fmt::format("more than {} levels of maps and lists within each "
-                                              "other",
-                                              kDeepestConfig));
+    if (levels_.size() >= kMaxConfigDepth) {
+      throw YAML::Exception(
+          mark, fmt::format("more than {} levels of nested maps and lists", kMaxConfigDepth));
     }
     RefuseTag(mark, tag);
     levels_.push_back({.node = At(mark), .is_flow = style == YAML::EmitterStyle::Flow});
@@ -223,8 +222,8 @@ class TreeBuilder : public YAML::EventHandler {
     }
   }
 
-  // Leaves out a node that was complained about already: a key with its value, a value with its
-  // key, or the item of a list.
+  // Drops a node that already has an error: a key with its value, a value with its key, or an item
+  // of a list.
   void SkipNode() {
     if (!levels_.empty() && levels_.back().node.IsMap()) {
       levels_.back().has_key = !levels_.back().has_key;
@@ -233,11 +232,11 @@ class TreeBuilder : public YAML::EventHandler {
   }
 
   void TakeKey(Level& level, const ConfigNode& node) {
-    if (++level.keys > kMostKeys) {
+    if (++level.keys > kMaxKeys) {
       YAML::Mark mark;
       mark.line = node.location.line - 1;
       mark.column = node.location.column - 1;
-      throw YAML::Exception(mark, fmt::format("more than {} entries in one map", kMostKeys));
+      throw YAML::Exception(mark, fmt::format("more than {} entries in one map", kMaxKeys));
     }
     level.is_key_good = node.IsScalar();
     level.key = node.text;
@@ -275,8 +274,7 @@ class TreeBuilder : public YAML::EventHandler {
       return;
     }
     if (value.IsNull()) {
-      value.location =
-          level.key_location;  // the parser's location of nothing is that of what follows
+      value.location = level.key_location;  // yaml-cpp gives a null the location of the next entry
     }
     level.node.entries.push_back({level.key, level.key_location, std::move(value)});
   }
@@ -289,11 +287,11 @@ class TreeBuilder : public YAML::EventHandler {
   int documents_ = 0;
 };
 
-// The state of one loading: what has been read so far, for cycles and for the order of errors.
+// The state of one load: the files read so far, to find cycles and to order the errors.
 struct Loading {
   ConfigErrors& errors;
-  int next_order = 0;                             // how many files have been read
-  std::vector<std::filesystem::path> chain = {};  // the files that lie above, canonical
+  int next_order = 0;                             // number of files read
+  std::vector<std::filesystem::path> chain = {};  // canonical paths of the files above this one
 };
 
 ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file, Loading& loading);
@@ -307,13 +305,13 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
     return fail("expected the path of a file");
   }
   const std::filesystem::path base_file = (file.parent_path() / base.text).lexically_normal();
-  std::error_code none;  // of a name that is too long, and the like: it will not be read either
+  std::error_code none;  // ignored: a path that has no canonical form cannot be read below either
   const auto canonical = std::filesystem::weakly_canonical(base_file, none);
   if (std::find(loading.chain.begin(), loading.chain.end(), canonical) != loading.chain.end()) {
     return fail(fmt::format("'{}' would be its own base", base.text));
   }
-  if (loading.next_order > static_cast<int>(kDeepestConfig)) {
-    return fail(fmt::format("more than {} bases, with theirs", kDeepestConfig));
+  if (loading.next_order > static_cast<int>(kMaxConfigDepth)) {
+    return fail(fmt::format("more than {} bases, including bases of bases", kMaxConfigDepth));
   }
   std::string text;
   try {
@@ -324,7 +322,7 @@ ConfigNode LoadBase(const ConfigNode& base, const std::filesystem::path& file, L
   return LoadDocument(text, base_file, loading);
 }
 
-// One base, or a list of them: each lies over those before it.
+// Loads one base, or a list of bases, each merged over those before it.
 ConfigNode LoadBases(const ConfigNode& bases, const std::filesystem::path& file, Loading& loading) {
   if (!bases.IsList() || bases.items.empty()) {
     return LoadBase(bases, file, loading);
@@ -363,7 +361,7 @@ ConfigNode LoadDocument(std::string_view text, const std::filesystem::path& file
   return MergeTrees(std::move(below), tree);
 }
 
-// One override laid over `tree`. `order` puts its errors among those of other sources.
+// Applies one override to `tree`. `order` sorts its errors among those of other sources.
 void ApplyOverride(std::string_view override_text, int order, const ConfigNode& defaults,
                    ConfigNode& tree, ConfigErrors& errors) {
   const ConfigSource source{.name = fmt::format("--set {}", override_text),
@@ -374,7 +372,7 @@ void ApplyOverride(std::string_view override_text, int order, const ConfigNode& 
   const std::size_t errors_before = errors.size();
   const ConfigLocation location{std::make_shared<const ConfigSource>(source)};
   if (equals == override_text.npos) {
-    errors.Add(location, "", "an override is written path=value");
+    errors.Add(location, "", "an override is written as path=value");
     return;
   }
   const ConfigNode value = ParseConfigText(override_text.substr(equals + 1), source, errors);
@@ -405,15 +403,15 @@ ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
   TreeBuilder builder(text, shared_source, errors);
   try {
     YAML::Parser parser(stream);
-    // The second round is for the complaint about a second document.
+    // The second call reports a second document.
     if (parser.HandleNextDocument(builder)) {
       parser.HandleNextDocument(builder);
     }
   } catch (const YAML::Exception& error) {
-    // The parser has no location for what ends too soon.
+    // yaml-cpp has no location for a text that ends too early.
     const bool is_at_end = error.msg.starts_with("end of ");
-    errors.Add(is_at_end ? EndOf(text, shared_source) : LocationAt(shared_source, error.mark), "",
-               fmt::format("this is not YAML: {}", error.msg));
+    errors.Add(is_at_end ? EndLocation(text, shared_source) : LocationAt(shared_source, error.mark),
+               "", fmt::format("this is not YAML: {}", error.msg));
     return EmptyMap(shared_source);
   }
   return builder.TakeRoot();

@@ -19,7 +19,7 @@ void AddError(ConfigErrors& errors, const ConfigItem& item, std::string_view wha
   errors.Add(item.node.location, item.path, what);
 }
 
-// What stands there, for "expected a number, found ...".
+// Describes an entry for "expected a number, found ...".
 std::string Describe(const ConfigNode& node) {
   switch (node.kind) {
     case ConfigNode::Kind::kNull:
@@ -52,7 +52,7 @@ std::string_view WithoutSign(std::string_view text) {
   return has_sign ? text.substr(1) : text;
 }
 
-// 010, 0o17, 0x1F, 0b11: numbers that readers of YAML disagree about.
+// Returns true for 010, 0o17, 0x1F and 0b11, which YAML readers read as different numbers.
 bool LooksLikeOtherBase(std::string_view text) {
   const std::string_view digits = WithoutSign(text);
   return digits.size() > 1 && digits[0] == '0' &&
@@ -69,13 +69,13 @@ bool LooksNonFinite(std::string_view text) {
   return false;
 }
 
-// from_chars takes no plus sign.
+// Removes a plus sign, which std::from_chars does not accept.
 std::string_view ForFromChars(std::string_view text) {
   const bool has_plus = text.size() > 1 && text[0] == '+' && text[1] != '-';
   return has_plus ? text.substr(1) : text;
 }
 
-// The number in `text`, or nothing if it is not wholly one that std::from_chars knows.
+// Reads `text` as a number. Returns nothing unless std::from_chars reads the whole text.
 std::optional<double> ToDouble(std::string_view text, std::errc& error) {
   const std::string_view bare = ForFromChars(text);
   double value = 0;
@@ -85,7 +85,7 @@ std::optional<double> ToDouble(std::string_view text, std::errc& error) {
   return all && error != std::errc::invalid_argument ? std::optional(value) : std::nullopt;
 }
 
-// Complaints that whole and other numbers share. False if one was made.
+// Checks that apply to whole and other numbers. Returns false if it added an error.
 bool RequireNumberLike(ConfigErrors& errors, const ConfigItem& item, std::string_view expected) {
   if (!RequireScalar(errors, item, expected)) {
     return false;
@@ -101,7 +101,7 @@ bool RequireNumberLike(ConfigErrors& errors, const ConfigItem& item, std::string
   } else if (LooksLikeOtherBase(text)) {
     AddError(
         errors, item,
-        fmt::format("'{}' is not plainly decimal; write {} without a leading 0", text, expected));
+        fmt::format("'{}' is not a plain decimal; write {} without a leading 0", text, expected));
   } else {
     return true;
   }
@@ -136,9 +136,8 @@ void ReadInteger(ConfigErrors& errors, const ConfigItem& item, Integer& out) {
              fmt::format("{} does not fit; allowed is {} to {}", item.node.text,
                          std::numeric_limits<Integer>::min(), std::numeric_limits<Integer>::max()));
   } else if (!is_whole && ToDouble(item.node.text, as_double)) {
-    AddError(
-        errors, item,
-        fmt::format("expected a whole number, found {}; write it in digits alone", item.node.text));
+    AddError(errors, item,
+             fmt::format("expected a whole number, found {}; write only digits", item.node.text));
   } else if (!is_whole) {
     AddKindError(errors, item, kExpected);
   } else if (RequireInRange(errors, item, value)) {
@@ -146,8 +145,8 @@ void ReadInteger(ConfigErrors& errors, const ConfigItem& item, Integer& out) {
   }
 }
 
-// Where a run's folder was moved to another machine, the whole paths in its resolved.yaml lead
-// nowhere; a file of the same name that lies beside it is meant then.
+// Resolves a path. If a run's folder was moved to another machine, the absolute paths in its
+// resolved.yaml no longer exist; then a file of the same name in `folder` is taken.
 std::filesystem::path FoundPath(const std::filesystem::path& folder, const std::string& text) {
   const std::filesystem::path named = std::filesystem::absolute(folder / text).lexically_normal();
   const std::filesystem::path beside =
@@ -307,14 +306,6 @@ void RefuseUnknownKeys(ConfigErrors& errors, const ConfigItem& item,
   }
 }
 
-std::string JoinPath(std::string_view parent, std::string_view key) {
-  return parent.empty() ? std::string(key) : fmt::format("{}.{}", parent, key);
-}
-
-std::string JoinPath(std::string_view parent, std::size_t index) {
-  return fmt::format("{}[{}]", parent, index);
-}
-
 std::string RangeText(const FieldInfo& info) {
   const bool has_min = std::isfinite(info.min), has_max = std::isfinite(info.max);
   const std::string unit = info.unit.empty() ? "" : fmt::format(" {}", info.unit);
@@ -326,5 +317,29 @@ std::string RangeText(const FieldInfo& info) {
   }
   return has_max ? fmt::format("at most {}{}", info.max, unit) : "";
 }
+
+namespace config_internal {
+
+ConfigNode ScalarToTree(bool value) { return ConfigNode::Scalar(value ? "true" : "false"); }
+
+ConfigNode ScalarToTree(int value) { return ConfigNode::Scalar(fmt::format("{}", value)); }
+
+ConfigNode ScalarToTree(std::uint64_t value) {
+  return ConfigNode::Scalar(fmt::format("{}", value));
+}
+
+ConfigNode ScalarToTree(const AutoOr<double>& value) {
+  return value.automatic ? ConfigNode::Scalar("auto") : ScalarToTree(value.value);
+}
+ConfigNode ScalarToTree(double value) { return ConfigNode::Scalar(fmt::format("{}", value)); }
+
+ConfigNode ScalarToTree(const std::string& value) { return ConfigNode::Quoted(value); }
+
+ConfigNode ScalarToTree(const std::filesystem::path& value) {
+  return ConfigNode::Quoted(
+      value.empty() ? "" : std::filesystem::absolute(value).lexically_normal().string());
+}
+
+}  // namespace config_internal
 
 }  // namespace semblance

@@ -4,10 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cctype>
 #include <charconv>
 #include <optional>
+#include <tuple>
 
-#include "problems/config/config_limits.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -17,14 +19,14 @@ namespace {
 struct Step {
   std::string_view key;
   std::optional<std::size_t> index;
-  std::string_view until_here;  // the path up to and with this step, for messages
+  std::string_view until_here;  // the path up to and including this step, for messages
 };
 
 [[noreturn]] void FailMalformed(std::string_view path) {
   throw ConfigError(fmt::format("{}: not a path; write it like a.b[0].c", path));
 }
 
-// Reads "name" or "[3]" (and the dot before a name) at `at`, and moves `at` behind it.
+// Reads "name" or "[3]" (and the dot before a name) at `at`, and moves `at` past it.
 Step TakeStep(std::string_view path, std::size_t& at) {
   Step step;
   if (path[at] == '[') {
@@ -61,15 +63,15 @@ std::vector<Step> ParsePath(std::string_view path) {
       FailMalformed(path);
     }
     steps.push_back(TakeStep(path, at));
-    if (steps.size() > kDeepestConfig) {
+    if (steps.size() > kMaxConfigDepth) {
       throw ConfigError(fmt::format("{}...: a path of more than {} steps leads nowhere",
-                                    path.substr(0, 40), kDeepestConfig));
+                                    path.substr(0, 40), kMaxConfigDepth));
     }
   } while (at < path.size());
   return steps;
 }
 
-// The bare name of a variant's type, as a map that options can be added to.
+// Turns the bare name of a variant's type into a map, to which options can be added.
 void ExpandBareName(ConfigNode& node) {
   if (node.IsScalar()) {
     ConfigNode map = ConfigNode::Map();
@@ -85,19 +87,19 @@ bool IsAnotherType(const ConfigNode& base, const ConfigNode& over) {
   return over_type && (!base_type || base_type->text != over_type->text);
 }
 
-// What `defaults` has for a map that stands at `node`: nothing, if the two are of different types.
+// Returns the defaults for the map `node`, or nullptr if the two have different types.
 const ConfigNode* MatchingDefaults(const ConfigNode& node, const ConfigNode* defaults) {
   const ConfigNode* type = node.Find("type");
   return defaults && type && IsAnotherType(*defaults, node) ? nullptr : defaults;
 }
 
-// Whether two entries were said together: in one file, or both by overrides.
+// Returns true if both entries are from the same file, or both are from overrides.
 bool IsSameLayer(const ConfigLocation& a, const ConfigLocation& b) {
   const bool are_overrides = a.source && b.source && !a.source->has_lines && !b.source->has_lines;
   return a.source && (a.source == b.source || are_overrides);
 }
 
-// Leaves of `node` what stands in the layer of `location`. Returns whether anything does.
+// Keeps only the parts of `node` from the layer of `location`. Returns true if any part is left.
 bool KeepLayer(ConfigNode& node, const ConfigLocation& location) {
   bool keeps_part = IsSameLayer(node.location, location);
   for (ConfigNode& item : node.items) {
@@ -108,9 +110,9 @@ bool KeepLayer(ConfigNode& node, const ConfigLocation& location) {
   return keeps_part || !node.entries.empty();
 }
 
-// A variant that is about to get the type that `type` names. Where that is another one, it replaces
-// what lower layers say of the variant, as in MergeTrees. Options given beside it stay: if the type
-// does not have them, the reader refuses them.
+// Prepares a variant for the type that `type` names. If the type changes, the options that lower
+// layers set are dropped, as in MergeTrees. Options of the same layer stay; the reader refuses them
+// if the new type does not have them.
 void ForgetFormerType(ConfigNode& variant, const ConfigNode& type, const ConfigNode* defaults) {
   const ConfigNode* named = variant.Find("type");
   const ConfigNode* former = named || !defaults ? named : defaults->Find("type");
@@ -119,7 +121,7 @@ void ForgetFormerType(ConfigNode& variant, const ConfigNode& type, const ConfigN
   }
 }
 
-// The entry that `step` names; made, as written at `location`, where it is missing.
+// Returns the entry that `step` names. A missing entry is created with `location`.
 ConfigNode& StepIntoMap(ConfigNode& node, const Step& step, const ConfigNode*& defaults,
                         bool is_last, const ConfigLocation& location) {
   ExpandBareName(node);
@@ -147,7 +149,7 @@ ConfigNode& StepIntoMap(ConfigNode& node, const Step& step, const ConfigNode*& d
 
 ConfigNode& StepIntoList(ConfigNode& node, const Step& step, const ConfigNode*& defaults) {
   if (!node.IsList()) {
-    throw ConfigError(fmt::format("{}: there is no list to take an item of", step.until_here));
+    throw ConfigError(fmt::format("{}: an index needs a list, and there is none", step.until_here));
   }
   if (*step.index >= node.items.size()) {
     throw ConfigError(fmt::format("{}: past the end; the list has {} item{}, counted from 0",
@@ -157,6 +159,94 @@ ConfigNode& StepIntoList(ConfigNode& node, const Step& step, const ConfigNode*& 
   const bool has_default = defaults && defaults->IsList() && *step.index < defaults->items.size();
   defaults = has_default ? &defaults->items[*step.index] : nullptr;
   return node.items[*step.index];
+}
+
+// Sort key of the errors. Defaults have no source and come first.
+std::tuple<int, int, int> SortKey(const ConfigFault& fault) {
+  const ConfigLocation& at = fault.location;
+  return {at.source ? at.source->order : -1, at.line, at.column};
+}
+
+// Returns true if every YAML reader takes the unquoted text as a text.
+bool IsPlainText(std::string_view text) {
+  constexpr std::array<std::string_view, 12> kOther = {
+      "null", "true", "false", "yes", "no", "on", "off", "y", "n", "nan", "inf", "infinity"};
+  std::string lower;
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (byte >= 0x80 ||
+        !(std::isalnum(byte) || std::string_view("_./-").find(c) != std::string_view::npos)) {
+      return false;
+    }
+    lower += static_cast<char>(std::tolower(byte));
+  }
+  const bool has_first = !lower.empty() && (std::isalpha(static_cast<unsigned char>(lower[0])) ||
+                                            lower[0] == '/' || lower[0] == '_');
+  return has_first && std::find(kOther.begin(), kOther.end(), lower) == kOther.end();
+}
+
+std::string QuotedText(std::string_view text) {
+  std::string out = "\"";
+  for (const char c : text) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (c == '"' || c == '\\') {
+      out += '\\';
+      out += c;
+    } else if (byte < 0x20 || byte == 0x7f) {
+      out += fmt::format("\\x{:02X}", byte);
+    } else {
+      out += c;
+    }
+  }
+  return out + '"';
+}
+
+std::string YamlText(std::string_view text) {
+  return IsPlainText(text) ? std::string(text) : QuotedText(text);
+}
+
+// Returns true if the node is written on the line of its key.
+bool IsInline(const ConfigNode& node) {
+  const auto is_leaf = [](const ConfigNode& item) { return item.IsScalar() || item.IsNull(); };
+  return is_leaf(node) || (node.IsMap() && node.entries.empty()) ||
+         (node.IsList() && std::all_of(node.items.begin(), node.items.end(), is_leaf));
+}
+
+void AddBlock(const ConfigNode& node, std::size_t indent, std::string& out) {
+  const std::string margin(indent, ' ');
+  if (IsInline(node)) {
+    out += fmt::format("{}{}\n", margin, ToFlowYaml(node));
+  } else if (node.IsMap()) {
+    for (const ConfigNode::Entry& entry : node.entries) {
+      out += fmt::format("{}{}:", margin, YamlText(entry.key));
+      if (IsInline(entry.value)) {
+        out += fmt::format(" {}\n", ToFlowYaml(entry.value));
+      } else {
+        out += "\n";
+        AddBlock(entry.value, indent + 2, out);
+      }
+    }
+  } else {
+    for (const ConfigNode& item : node.items) {
+      const std::size_t begin = out.size();
+      AddBlock(item, indent + 2, out);
+      out[begin + indent] = '-';
+    }
+  }
+}
+
+void RequireFinite(const ConfigNode& node, const std::string& path) {
+  if (node.IsScalar() && !node.quoted &&
+      (node.text.ends_with("nan") || node.text.ends_with("inf"))) {
+    throw InputError(fmt::format(
+        "{}: {} cannot be written to a configuration; only finite numbers can", path, node.text));
+  }
+  for (const ConfigNode::Entry& entry : node.entries) {
+    RequireFinite(entry.value, JoinPath(path, entry.key));
+  }
+  for (std::size_t i = 0; i < node.items.size(); ++i) {
+    RequireFinite(node.items[i], JoinPath(path, i));
+  }
 }
 
 }  // namespace
@@ -207,6 +297,14 @@ ConfigNode& ConfigNode::Set(std::string_view key, ConfigNode value) {
   return entries.back().value;
 }
 
+std::string JoinPath(std::string_view parent, std::string_view key) {
+  return parent.empty() ? std::string(key) : fmt::format("{}.{}", parent, key);
+}
+
+std::string JoinPath(std::string_view parent, std::size_t index) {
+  return fmt::format("{}[{}]", parent, index);
+}
+
 ConfigNode MergeTrees(ConfigNode base, const ConfigNode& over) {
   if (!over.IsMap()) {
     return over;
@@ -240,7 +338,7 @@ ConfigLocation LocationOf(const ConfigNode& tree, std::string_view path) {
 void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,
              const ConfigNode* defaults) {
   const std::vector<Step> steps = ParsePath(path);
-  ConfigNode edited = tree;  // so that a path that leads nowhere changes nothing
+  ConfigNode edited = tree;  // a copy, so that a wrong path changes nothing
   ConfigNode* node = &edited;
   for (const Step& step : steps) {
     const bool is_last = &step == &steps.back();
@@ -252,6 +350,50 @@ void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,
   }
   *node = MergeTrees(std::move(*node), value);
   tree = std::move(edited);
+}
+
+void ConfigErrors::Add(const ConfigLocation& location, std::string_view path,
+                       std::string_view what) {
+  faults_.push_back({location, std::string(path), std::string(what)});
+}
+
+void ConfigErrors::ThrowIfAny() const {
+  if (faults_.empty()) {
+    return;
+  }
+  std::vector<ConfigFault> sorted = faults_;
+  std::ranges::stable_sort(sorted, {}, SortKey);
+  std::string lines;
+  for (const ConfigFault& fault : sorted) {
+    lines += fmt::format("{}{}: {}{}{}", lines.empty() ? "" : "\n", ToText(fault.location),
+                         fault.path, fault.path.empty() ? "" : ": ", fault.what);
+  }
+  throw ConfigError(lines);
+}
+
+std::string ToFlowYaml(const ConfigNode& tree) {
+  if (tree.IsNull()) {
+    return "null";
+  }
+  if (tree.IsScalar()) {
+    return tree.quoted ? YamlText(tree.text) : tree.text;
+  }
+  std::string inside;
+  for (const ConfigNode::Entry& entry : tree.entries) {
+    inside += fmt::format("{}{}: {}", inside.empty() ? "" : ", ", YamlText(entry.key),
+                          ToFlowYaml(entry.value));
+  }
+  for (const ConfigNode& item : tree.items) {
+    inside += fmt::format("{}{}", inside.empty() ? "" : ", ", ToFlowYaml(item));
+  }
+  return tree.IsMap() ? fmt::format("{{{}}}", inside) : fmt::format("[{}]", inside);
+}
+
+std::string ToYaml(const ConfigNode& tree) {
+  RequireFinite(tree, "");
+  std::string out;
+  AddBlock(tree, 0, out);
+  return out;
 }
 
 }  // namespace semblance

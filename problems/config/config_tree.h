@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A parsed document as a plain tree that remembers where each entry stands. Nothing in it knows the
-// types that will be read from it, so base files, overrides and the axes of a study are edits of
-// trees.
+// A parsed document as a plain tree that remembers the location of each entry, the errors found in
+// it, and the tree as YAML text. The tree is independent of the types that are read from it, so
+// base files, overrides and the axes of a study are edits of trees.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -13,17 +14,25 @@
 
 namespace semblance {
 
-// Where a tree was read from.
+// Limits against hostile files, far above what real files need. They bound recursion, which must
+// fit the stack: levels of nested maps and lists, steps of a path, and bases including their own
+// bases.
+inline constexpr std::size_t kMaxConfigDepth = 64;
+// Keys of one map. The search for a key is linear, so many keys would take quadratic time.
+inline constexpr int kMaxKeys = 10'000;
+inline constexpr std::size_t kLargestConfig_bytes = 16'000'000;
+
+// The file or override that a tree was read from.
 struct ConfigSource {
   std::string name;              // the file as the user wrote it, or "--set a.b=c"
-  std::filesystem::path folder;  // what relative paths in it are relative to
-  int order = 0;                 // errors are listed source by source, in this order
+  std::filesystem::path folder;  // base of the relative paths in it
+  int order = 0;                 // position among the sources when errors are listed
   bool has_lines = true;         // false for an override, which has no line and column
 };
 
-// A location in a source, for messages. line and column count from 1; 0 where there is none.
+// A location in a source, for messages. Lines and columns count from 1; 0 means none.
 struct ConfigLocation {
-  std::shared_ptr<const ConfigSource> source;  // null for defaults, which stand in no file
+  std::shared_ptr<const ConfigSource> source;  // null for defaults, which are in no file
   int line = 0;
   int column = 0;
 };
@@ -37,11 +46,11 @@ struct ConfigNode {
   struct Entry;
 
   Kind kind = Kind::kNull;
-  std::string text;               // of a scalar, without its quotes
-  bool quoted = false;            // a quoted scalar is a text, never a number or true
-  ConfigLocation location;        // of a null in a map: that of its key
-  std::vector<Entry> entries;     // of a map, in the order of the file
-  std::vector<ConfigNode> items;  // of a list
+  std::string text;               // a scalar's text, without its quotes
+  bool quoted = false;            // a quoted scalar is a text, never a number or boolean
+  ConfigLocation location;        // a null in a map has the location of its key
+  std::vector<Entry> entries;     // a map's entries, in the order of the file
+  std::vector<ConfigNode> items;  // a list's items
 
   static ConfigNode Scalar(std::string text);
   static ConfigNode Quoted(std::string text);
@@ -53,7 +62,7 @@ struct ConfigNode {
   bool IsMap() const { return kind == Kind::kMap; }
   bool IsList() const { return kind == Kind::kList; }
 
-  // The value under `key`, or null pointer. Only maps have any.
+  // Returns the value under `key`, or nullptr if there is none or the node is not a map.
   const ConfigNode* Find(std::string_view key) const;
   ConfigNode* Find(std::string_view key);
   // Adds or replaces the value under `key`; the node must be a map.
@@ -69,12 +78,12 @@ struct ConfigNode::Entry {
   ConfigNode value;
 };
 
-// Here, where an entry is a whole type.
+// Defined here because Entry must be complete.
 inline ConfigNode ConfigNode::Map() { return OfKind(Kind::kMap); }
 inline ConfigNode ConfigNode::List() { return OfKind(Kind::kList); }
 
-// A map in the order of the file that remembers where its keys stand: a field for option paths and
-// other keys whose order or location matters.
+// A map that keeps the order of the file and the location of each key, for fields whose keys are
+// option paths, or whose order or location matters.
 template <class T>
 struct ConfigMap {
   struct Entry {
@@ -85,22 +94,61 @@ struct ConfigMap {
   std::vector<Entry> entries;
 };
 
-// `over` laid over `base`: maps merge key by key, all else replaces. A map whose `type` differs
-// from the one in `base` replaces it wholly; a map without `type` over the bare name of a type
-// gives options to that type.
+// Merges `over` over `base`: maps merge key by key, anything else replaces. A map whose `type`
+// differs from that of `base` replaces `base` wholly. A map without `type` over the bare name of a
+// type sets options of that type.
 ConfigNode MergeTrees(ConfigNode base, const ConfigNode& over);
 
-// Where the entry at `path` ("a.b[0].c") stands; where the tree does not hold it, the last entry on
-// the way to it.
+// Joins the path of a parent with a key ("a.b", or "b" at the top) or an index ("a[3]").
+std::string JoinPath(std::string_view parent, std::string_view key);
+std::string JoinPath(std::string_view parent, std::size_t index);
+
+// Returns the location of the entry at `path` ("a.b[0].c"), or, if the tree lacks the entry, the
+// location of the last existing entry on the way to it.
 ConfigLocation LocationOf(const ConfigNode& tree, std::string_view path);
 
-// Sets the entry at `path` ("a.b[0].c"; an index counts from 0) to `value`, merging as MergeTrees
-// does. Maps on the way are made where they are missing; a list must have the item already.
-// A new `type` of a variant drops what other layers (files, all overrides together) say of it.
-// `defaults`, where given, is the tree of the default values: an entry that the path goes through
-// and `tree` lacks starts as a copy of the default, so that an item of a default list can be set.
-// Throws ConfigError ("a.b: what") if the path is malformed or leads nowhere.
+// Sets the entry at `path` ("a.b[0].c"; indices count from 0) to `value`, merging as MergeTrees
+// does. Missing maps on the way are created; a list must already have the item. A new `type` of a
+// variant drops the options that other layers set in it; each file is a layer, and all overrides
+// together are one. `defaults`, if given, is the tree of the default values: an entry on the way
+// that `tree` lacks starts as a copy of its default, so that an item of a default list can be set.
+// Throws ConfigError ("a.b: what") if the path is malformed or leads nowhere, and then changes
+// nothing.
 void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,
              const ConfigNode* defaults = nullptr);
+
+// An error at a path, worded as for ConfigErrors::Add.
+struct OptionFault {
+  std::string path, what;
+};
+
+// An error with its location.
+struct ConfigFault {
+  ConfigLocation location;
+  std::string path, what;
+};
+
+// Collects all errors of a configuration, so that the user sees them together.
+class ConfigErrors {
+ public:
+  // `path` is the path of the entry ("a.b[0].c"), empty for the whole document. `what` is one or
+  // more clauses, with the remedy.
+  void Add(const ConfigLocation& location, std::string_view path, std::string_view what);
+  std::size_t size() const { return faults_.size(); }
+  const std::vector<ConfigFault>& faults() const { return faults_; }
+  // Throws ConfigError with one line per error, sorted by source, line and column. Does nothing if
+  // there is no error.
+  void ThrowIfAny() const;
+
+ private:
+  std::vector<ConfigFault> faults_;
+};
+
+// Writes a tree as YAML text that the strict reader reads back, in block style with one line per
+// entry. Throws InputError if a number is not finite.
+std::string ToYaml(const ConfigNode& tree);
+
+// Writes a tree on one line: {a: 1, b: [2, 3]}. Numbers that are not finite are allowed.
+std::string ToFlowYaml(const ConfigNode& tree);
 
 }  // namespace semblance

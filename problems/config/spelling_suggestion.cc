@@ -13,7 +13,7 @@ namespace {
 
 char Lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
 
-bool LacksOnlyItsEnd(std::string_view word, std::string_view known) {
+bool LacksOnlyEnding(std::string_view word, std::string_view known) {
   return !word.empty() && known.size() > word.size() && known.starts_with(word) &&
          known[word.size()] == '_';
 }
@@ -47,10 +47,10 @@ std::string NearestWord(std::string_view word, std::span<const std::string> know
   for (const std::string& candidate : known) {
     const int longer = static_cast<int>(std::max(word.size(), candidate.size()));
     const int shorter = static_cast<int>(std::min(word.size(), candidate.size()));
-    if (!LacksOnlyItsEnd(word, candidate) && 3 * (longer - shorter) > std::max(longer, 3)) {
-      continue;  // so many edits at least; a word may be as long as a file
+    if (!LacksOnlyEnding(word, candidate) && 3 * (longer - shorter) > std::max(longer, 3)) {
+      continue;  // the lengths alone rule it out; a word may be as long as a file
     }
-    const int distance = LacksOnlyItsEnd(word, candidate) ? 1 : EditDistance(word, candidate);
+    const int distance = LacksOnlyEnding(word, candidate) ? 1 : EditDistance(word, candidate);
     if (distance < least && 3 * distance <= std::max(longer, 3)) {
       least = distance;
       nearest = candidate;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Texts that come from files, on a terminal and in a shell.
+// Makes texts that come from files safe for a terminal and for a shell.
 #pragma once
 
 #include <fmt/format.h>
@@ -10,14 +10,14 @@
 
 namespace semblance {
 
-// The text with its lines, and '?' for every other control character (those of U+0080 to U+009F
-// too), so that no name can drive the terminal.
+// Replaces every control character except line feeds by '?', also U+0080 to U+009F, so that no name
+// in a file can control the terminal.
 std::string ForTerminal(std::string_view text);
 
-// The text as one word for a POSIX shell, whatever is in it.
+// Quotes any text as one word for a POSIX shell.
 std::string QuotedForShell(std::string_view text);
 
-// Prints a line whose values may come from files, such as names of subjects.
+// Prints a line whose values may come from files, such as names of subjects, through ForTerminal.
 template <class... Values>
 void Tell(fmt::format_string<Values...> words, Values&&... values) {
   fmt::print("{}", ForTerminal(fmt::format(words, std::forward<Values>(values)...)));

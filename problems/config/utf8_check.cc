@@ -10,9 +10,9 @@ unsigned char ByteAt(std::string_view text, std::size_t i) {
   return static_cast<unsigned char>(text[i]);
 }
 
-// Of the first two bytes of a longer sequence: not more bytes than needed, no half of a pair of
-// UTF-16 (U+D800 to U+DFFF), nothing above U+10FFFF.
-bool IsShortestCharacter(unsigned char first, unsigned char second) {
+// Checks the first two bytes of a sequence of several bytes. Returns false for a sequence that is
+// longer than needed, for half of a UTF-16 pair (U+D800 to U+DFFF), and above U+10FFFF.
+bool IsValidStart(unsigned char first, unsigned char second) {
   switch (first) {
     case 0xE0:
       return second >= 0xA0;
@@ -27,7 +27,7 @@ bool IsShortestCharacter(unsigned char first, unsigned char second) {
   }
 }
 
-// The length of the UTF-8 sequence at `i`; 0 if there is none.
+// Returns the length of the UTF-8 sequence at `i`, or 0 if it is not UTF-8.
 std::size_t SequenceLength(std::string_view text, std::size_t i) {
   const unsigned char first = ByteAt(text, i);
   const std::size_t length = first < 0x80                    ? 1
@@ -43,7 +43,7 @@ std::size_t SequenceLength(std::string_view text, std::size_t i) {
       return 0;
     }
   }
-  return length == 1 || IsShortestCharacter(first, ByteAt(text, i + 1)) ? length : 0;
+  return length == 1 || IsValidStart(first, ByteAt(text, i + 1)) ? length : 0;
 }
 
 bool IsControl(char c) {
@@ -51,7 +51,7 @@ bool IsControl(char c) {
   return byte < 0x20 || byte == 0x7F;
 }
 
-// The first complaint about a line, or "". `column` is where, from 0.
+// Returns the first fault of a line, or "", and sets `column` to its place, from 0.
 std::string_view FindFault(std::string_view line, std::size_t& column) {
   const std::size_t first = line.find_first_not_of(" \t");
   const bool is_comment = first != line.npos && line[first] == '#';

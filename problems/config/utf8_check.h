@@ -1,22 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is wrong with the bytes of a configuration, or of another text, before any of it is parsed.
+// Checks the bytes of a configuration, or of another text, before it is parsed.
 #pragma once
 
 #include <memory>
 #include <optional>
 #include <string_view>
 
-#include "problems/config/config_errors.h"
+#include "problems/config/config_tree.h"
 
 namespace semblance {
 
-// Adds an error for each line with a tab (which looks like spaces but is none; lines that are
-// comments may have them) or another control character, and for bytes that are not UTF-8. True if
-// there were none.
+// Adds an error for each line that has a tab outside a comment (it looks like spaces), another
+// control character, or a byte that is not UTF-8. Returns true if there is none.
 bool RequireReadableBytes(std::string_view text, const std::shared_ptr<const ConfigSource>& source,
                           ConfigErrors& errors);
 
-// The line, from 1, of the first byte that is not UTF-8; nothing if there is none.
+// Returns the line, from 1, of the first byte that is not UTF-8, or nothing.
 std::optional<int> LineThatIsNotUtf8(std::string_view text);
 
 }  // namespace semblance

@@ -16,7 +16,7 @@
 
 namespace semblance {
 
-// all: every part holds; any: one does; negated: its part does not; else a comparison.
+// kAll holds if every part holds, kAny if one part does, kNot if its only part does not.
 struct ValueFilter::Node {
   enum class Kind { kAll, kAny, kNot, kCompare };
   Kind kind = Kind::kCompare;
@@ -34,7 +34,7 @@ std::optional<double> NumberIn(std::string_view text) {
 
 namespace {
 
-constexpr int kDeepest = 64;  // parts inside each other
+constexpr int kMaxDepth = 64;  // nested parts; a bound on recursion, far above real conditions
 
 using Node = ValueFilter::Node;
 
@@ -55,7 +55,7 @@ bool InOrder(const Node& node, const std::string& found) {
                              : *a >= *b;
 }
 
-bool Compares(const Node& node, const std::string& found) {
+bool HoldsFor(const Node& node, const std::string& found) {
   return node.sign == "=" || node.sign == "!=" ? Equal(found, node.value)
          : node.sign == "~" ? ::fnmatch(node.value.c_str(), found.c_str(), 0) == 0
                             : InOrder(node, found);
@@ -75,7 +75,7 @@ bool Holds(const Node& node, const NamedValues& values) {
   }
   const auto [first, last] = values.equal_range(node.name);
   const bool one =
-      std::any_of(first, last, [&](const auto& entry) { return Compares(node, entry.second); });
+      std::any_of(first, last, [&](const auto& entry) { return HoldsFor(node, entry.second); });
   return node.sign == "!=" ? !one : one;
 }
 
@@ -98,13 +98,13 @@ class Parser {
   Node Parse() {
     Node node = Any();
     if (next_ < tokens_.size()) {
-      Fail("'and' or 'or' is missing before this");
+      Fail("'and' or 'or' is missing before it");
     }
     return node;
   }
 
  private:
-  // Returns where the next one may begin.
+  // Adds the token at `at`, if there is one. Returns the place after it.
   std::size_t AddToken(std::size_t at) {
     const char c = text_[at];
     if (c == ' ' || c == '\t') {
@@ -166,8 +166,8 @@ class Parser {
     if (!negated && !Take("(")) {
       return Comparison();
     }
-    if (++depth_ > kDeepest) {
-      Fail(fmt::format("more than {} parts inside each other", kDeepest));
+    if (++depth_ > kMaxDepth) {
+      Fail(fmt::format("more than {} nested parts", kMaxDepth));
     }
     Node node = negated ? Negated(One()) : Any();
     --depth_;
@@ -185,7 +185,7 @@ class Parser {
 
   Node Comparison() {
     Node node;
-    node.name = NameCalled(Word("a name"));
+    node.name = FindName(Word("a name"));
     const std::vector<std::string> signs = {"=", "==", "!=", "<", "<=", ">", ">=", "~"};
     const auto sign = std::ranges::find_if(signs, [&](const std::string& s) { return Take(s); });
     if (sign == signs.end()) {
@@ -204,22 +204,22 @@ class Parser {
     return tokens_[next_++].text;
   }
 
-  std::string NameCalled(const std::string& word) const {
-    std::vector<std::string> meant;
+  std::string FindName(const std::string& word) const {
+    std::vector<std::string> matches;
     for (const std::string& name : names_) {
       if (name == word) {
         return name;
       }
       if (name.ends_with("." + word)) {
-        meant.push_back(name);
+        matches.push_back(name);
       }
     }
-    if (meant.size() != 1) {
+    if (matches.size() != 1) {
       throw InputError(fmt::format("{}: {} '{}'{}", text_,
-                                   meant.empty() ? "unknown name" : "there are several", word,
-                                   Suggestion(word, meant.empty() ? names_ : meant)));
+                                   matches.empty() ? "unknown name" : "ambiguous name", word,
+                                   Suggestion(word, matches.empty() ? names_ : matches)));
     }
-    return meant.front();
+    return matches.front();
   }
 
   std::string_view text_;

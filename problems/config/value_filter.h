@@ -3,9 +3,9 @@
 //
 //     subject = a and (interp = kriging or interp = mean) and not rounds >= 3
 //
-// A comparison is NAME OP VALUE. OP: = and != (as numbers where both are, else as text), < <= > >=
-// (numbers alone), ~ (a pattern with * and ?). `not` binds closest, then `and`, then `or`;
-// parentheses group. A value with blanks or signs stands in single or double quotes.
+// A comparison is NAME OP VALUE. OP is one of: = and != (compare numbers if both are numbers, else
+// text), < <= > >= (numbers only), ~ (a pattern with * and ?). `not` binds closest, then `and`,
+// then `or`; parentheses group. A value with blanks or signs must be in single or double quotes.
 #pragma once
 
 #include <map>
@@ -17,24 +17,25 @@
 
 namespace semblance {
 
-// The text as a number, where all of it is one, and a finite one.
+// Reads a text as a number. Returns nothing unless the whole text is one finite number.
 std::optional<double> NumberIn(std::string_view text);
 
-// A name may have several values: = and the like hold if one of them does, != if none is equal.
+// A name may have several values. A comparison holds if it holds for one of them; != holds if no
+// value is equal.
 using NamedValues = std::multimap<std::string, std::string>;
 
 class ValueFilter {
  public:
-  // A name may also be the last part of one of `names` ("resolution" of "implicit.resolution")
-  // where it is of one alone. Throws InputError, in one line that shows where: what is no such
-  // condition, a name that is unknown or could be several, more than 64 `not` and parentheses
-  // inside each other.
+  // A name may also be the last part of one of `names` ("resolution" for "implicit.resolution") if
+  // only one of them ends so. Throws InputError, with the place in one line, for a text that is not
+  // a condition, for an unknown or ambiguous name, and for more than 64 nested `not` and
+  // parentheses.
   ValueFilter(std::string_view text, std::span<const std::string> names);
   ~ValueFilter();
   ValueFilter(ValueFilter&&) noexcept;
 
-  // A comparison of a name that has no value does not hold, but for !=. Throws InputError where <
-  // and the like meet a value that is not a number.
+  // A comparison with a name that has no value is false, except for !=. Throws InputError if < <= >
+  // or >= meets a value that is not a number.
   bool Holds(const NamedValues& values) const;
 
   struct Node;

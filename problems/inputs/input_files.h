@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/config/named_files.h"
+#include "problems/config/config_binder.h"
 #include "problems/output/given_files.h"
 #include "problems/pipeline/experiment.h"
 

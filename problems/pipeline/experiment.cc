@@ -11,7 +11,7 @@
 
 #include "fitting/plan/fit_check.h"
 #include "problems/bust/bust_model.h"
-#include "problems/config/config_writer.h"
+#include "problems/config/config_tree.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"

@@ -18,7 +18,7 @@
 #include "interp/interpolate_depth.h"
 #include "interp/schemes/outside_rule.h"
 #include "problems/bust/bust_source.h"
-#include "problems/config/config_errors.h"
+#include "problems/config/config_tree.h"
 #include "problems/ct/import_ct.h"
 #include "problems/face_template/template_source.h"
 #include "problems/metrics/face_region.h"

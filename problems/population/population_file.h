@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "interp/evaluation/depth_truth.h"
-#include "problems/config/named_files.h"
+#include "problems/config/config_binder.h"
 #include "problems/pipeline/experiment.h"
 
 namespace semblance {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/config/config_errors.h"
+#include "problems/config/config_tree.h"
 #include "problems/prior/face_prior.h"
 #include "problems/subject/landmarks.h"
 #include "surfaces/base/fields.h"

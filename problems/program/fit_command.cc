@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "problems/config/config.h"
+#include "problems/config/config_binder.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"

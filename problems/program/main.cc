@@ -12,7 +12,6 @@
 
 #include "problems/command_line/command_tree.h"
 #include "problems/command_line/exit_code.h"
-#include "problems/command_line/unknown_word.h"
 #include "problems/program/face_commands.h"
 #include "problems/program/failure.h"
 #include "problems/program/fit_command.h"

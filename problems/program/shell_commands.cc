@@ -8,7 +8,6 @@
 
 #include "problems/command_line/command_tree.h"
 #include "problems/command_line/exit_code.h"
-#include "problems/command_line/manual_page.h"
 #include "problems/command_line/shell_completion.h"
 
 namespace semblance {

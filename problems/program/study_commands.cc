@@ -19,7 +19,6 @@
 #include "problems/output/staged_folder.h"
 #include "problems/study/study_run.h"
 #include "problems/study/study_submit.h"
-#include "problems/study_report/search_report.h"
 #include "problems/study_report/study_ranking.h"
 #include "problems/study_report/study_report.h"
 
@@ -28,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the user typed; each command reads its part.
+// The arguments of all study commands. Each command reads its part.
 struct StudyArguments {
   std::vector<std::string> files;
   std::string out, shard;
@@ -41,7 +40,7 @@ struct StudyArguments {
 };
 
 int PrintPlan(const StudyPlan& plan, const std::string& only) {
-  const std::vector<bool> chosen = TrialsThat(plan, only);
+  const std::vector<bool> chosen = SelectTrials(plan, only);
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     const StudyTrial& trial = plan.trials[n];
     if (chosen[n]) {
@@ -50,27 +49,21 @@ int PrintPlan(const StudyPlan& plan, const std::string& only) {
   }
   Tell("plan {}: {} trials over {}\n", plan.hash, plan.trials.size(), fmt::join(plan.axes, ", "));
   if (!only.empty()) {
-    Tell("of these {} where {}\n", std::ranges::count(chosen, true), only);
-  }
-  if (plan.search) {
-    Tell(
-        "then a search: treatments for {} full runs, each on {} subjects; which they are depends "
-        "on what those before gave\n",
-        plan.search->options.budget, plan.search->subjects.size());
+    Tell("of these, {} fulfil: {}\n", std::ranges::count(chosen, true), only);
   }
   return kDone;
 }
 
-// A number that no trial has ranks nothing; false then.
-bool TellOfMetric(const StudyResults& results) {
+// Prints a complaint and returns false if no trial has the metric.
+bool CheckMetric(const StudyResults& results) {
   const bool has = results.HasMetric() || results.Count("done") == 0;
   if (!has) {
-    Tell("no trial has the number '{}'; trials.csv lists those that there are\n", results.metric);
+    Tell("no trial has the number '{}'; trials.csv lists all numbers\n", results.metric);
   }
   return has;
 }
 
-// What a study's folder holds, and how to go on.
+// Prints the state of a study's folder, and how to continue.
 int PrintStudyState(const StudyResults& results, const fs::path& root) {
   for (const TrialRow& row : results.trials) {
     if (row.status == "failed" || row.status == "missing") {
@@ -79,45 +72,42 @@ int PrintStudyState(const StudyResults& results, const fs::path& root) {
     }
   }
   Tell("{}", RankingText(results));
-  if (const auto search = ReadSearchResults(root, results)) {
-    Tell("{}", SearchText(results, *search));
-  }
   Tell("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
        results.trials.size(), results.Count("unusable"), results.Count("failed"),
        results.Count("missing"));
   if (fs::exists(root / "report.html")) {
     Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
   } else {
-    Tell("no report yet; semblance merge {} makes one of what is there\n", root.string());
+    Tell("no report yet; semblance merge {} makes one of the finished trials\n", root.string());
   }
-  const bool has_metric = TellOfMetric(results);
+  const bool has_metric = CheckMetric(results);
   return has_metric && results.Count("done") == static_cast<int>(results.trials.size())
              ? kDone
              : kNotUsable;
 }
 
-// Of the trials that were asked for; the others may be missing.
-int PrintPartState(const StudyResults& results, const std::vector<bool>& asked,
+// Prints the state of the trials that --only selected; the others may be missing.
+int PrintPartState(const StudyResults& results, const std::vector<bool>& selected,
                    const fs::path& root) {
   int count = 0, done = 0;
   for (std::size_t n = 0; n < results.trials.size(); ++n) {
     const TrialRow& row = results.trials[n];
-    count += asked[n] ? 1 : 0;
-    done += asked[n] && row.status == "done" ? 1 : 0;
-    if (asked[n] && row.status != "done") {
+    count += selected[n] ? 1 : 0;
+    done += selected[n] && row.status == "done" ? 1 : 0;
+    if (selected[n] && row.status != "done") {
       Tell("{}: {} {} | {}: {}\n", row.status, row.id, row.subject, fmt::join(row.values, " | "),
            row.reason);
     }
   }
-  Tell("{} of the {} trials asked for done; of all {} of the study {} are missing\n", done, count,
-       results.trials.size(), results.Count("missing"));
+  Tell("{} of the {} selected trials done; {} of all {} trials of the study are missing\n", done,
+       count, results.Count("missing"), results.trials.size());
   Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
-  return TellOfMetric(results) && done == count ? kDone : kNotUsable;
+  return CheckMetric(results) && done == count ? kDone : kNotUsable;
 }
 
-// With its progress on the terminal, unless it is to be quiet.
-StudySummary RunTold(const StudyPlan& plan, const fs::path& root, StudyRunOptions options,
-                     const StudyArguments& a) {
+// Runs a study and shows its progress on the terminal, unless --quiet.
+StudySummary RunWithProgress(const StudyPlan& plan, const fs::path& root, StudyRunOptions options,
+                             const StudyArguments& a) {
   StudyProgress progress(stderr);
   if (!a.quiet) {
     options.on_progress = [&progress](const StudyEta& eta, const std::string& trial) {
@@ -129,16 +119,16 @@ StudySummary RunTold(const StudyPlan& plan, const fs::path& root, StudyRunOption
   return RunStudy(plan, root, options, context);
 }
 
-void TellChange(const StudySummary& summary, const fs::path& root) {
+void PrintChange(const StudySummary& summary, const fs::path& root) {
   if (summary.changed) {
     Tell(
-        "note: the study has changed since {} was written: of the {} trials asked for now {} were "
-        "there already; {} of the earlier plan are no longer in it, and stay in trials/\n",
-        root.string(), summary.trials, summary.skipped, summary.left_over);
+        "note: the study has changed since {} was written: {} of the {} trials exist already; {} "
+        "trials of the earlier plan are no longer in it, and stay in trials/\n",
+        root.string(), summary.skipped, summary.trials, summary.left_over);
   }
 }
 
-StudyRunOptions RunOptionsOf(const StudyArguments& a) {
+StudyRunOptions MakeRunOptions(const StudyArguments& a) {
   StudyRunOptions options = a.run;
   const Shard shard = ShardOf(a.shard);
   options.shard = shard.index;
@@ -150,29 +140,24 @@ StudyRunOptions RunOptionsOf(const StudyArguments& a) {
   return options;
 }
 
-// A shard leaves tables and report to the merge.
-void TellShard(const StudySummary& summary, const StudyRunOptions& options) {
+// A shard writes no tables and no report; the merge does.
+void PrintShard(const StudySummary& summary, const StudyRunOptions& options) {
   Tell(
-      "shard {} of {}: {} trials, {} already there, {} done, {} failed; gather with semblance "
+      "shard {} of {}: {} trials, {} existed, {} done, {} failed; collect them with semblance "
       "merge\n",
       options.shard, options.shards, summary.trials, summary.skipped, summary.done, summary.failed);
-  if (summary.waits) {
-    fmt::print(
-        "the search waits for the other shards of this generation; when theirs are in the "
-        "folder, call every shard again for the next\n");
-  }
 }
 
 int StudyCommand(const StudyArguments& a) {
   const bool plan_only = a.list || (a.files.size() == 2 && a.files[0] == "plan");
   if (a.files.size() == 2 && !plan_only) {
     throw InputError(
-        fmt::format("study {} {}: one study at a time; the word before the file can be "
-                    "'plan' alone",
+        fmt::format("study {} {}: one study at a time; only the word 'plan' may stand before "
+                    "the file",
                     a.files[0], a.files[1]));
   }
   const fs::path file = a.files.back();
-  const StudyRunOptions options = RunOptionsOf(a);
+  const StudyRunOptions options = MakeRunOptions(a);
   const StudyPlan plan = ReadStudy(file);
   for (const std::string& note : plan.notes) {
     Tell("note: {}\n", note);
@@ -181,16 +166,16 @@ int StudyCommand(const StudyArguments& a) {
     return PrintPlan(plan, options.only);
   }
   const fs::path root = a.out.empty() ? "out/" + file.stem().string() : a.out;
-  const StudySummary summary = RunTold(plan, root, options, a);
-  TellChange(summary, root);
+  const StudySummary summary = RunWithProgress(plan, root, options, a);
+  PrintChange(summary, root);
   if (options.shards > 1) {
-    TellShard(summary, options);
+    PrintShard(summary, options);
     return kDone;
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   const StudyResults results = WriteStudyTables(folder);
   return options.only.empty() ? PrintStudyState(results, root)
-                              : PrintPartState(results, TrialsThat(plan, options.only), root);
+                              : PrintPartState(results, SelectTrials(plan, options.only), root);
 }
 
 int MergeCommand(const StudyArguments& a) {
@@ -199,7 +184,7 @@ int MergeCommand(const StudyArguments& a) {
     fmt::print(stderr, "semblance: {}\n", ForTerminal(line));
   }
   if (!fs::exists(root / "plan.json")) {
-    throw IoError(fmt::format("{}: not a folder of a study; it has no plan.json", root.string()));
+    throw IoError(fmt::format("{}: not the folder of a study; it has no plan.json", root.string()));
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   return PrintStudyState(WriteStudyTables(folder), root);
@@ -240,12 +225,7 @@ int SubmitCommand(const StudyArguments& a) {
   options.program = fs::read_symlink("/proc/self/exe");
   options.study = a.files.at(0);
   options.folder = a.out.empty() ? "out/" + options.study.stem().string() : a.out;
-  if (ReadStudy(options.study).search) {  // its faults are said here, not by every node
-    throw InputError(fmt::format(
-        "{}: a search goes on from what it has found, so an array of jobs cannot do it; submit "
-        "`semblance study` with --jobs as one job",
-        options.study.string()));
-  }
+  ReadStudy(options.study);  // reports its faults here rather than on every node
   fmt::print("{}", SubmitScript(options));
   std::fflush(stdout);
   SubmitStudy(options);
@@ -255,13 +235,15 @@ int SubmitCommand(const StudyArguments& a) {
 void DeclareStudy(CLI::App& study, CommandLine& line) {
   StudyArguments& a = *Bind(study, line, &StudyCommand);
   a.stop = line.stop;
-  study.add_option("CONFIG", a.files, "YAML file of the study; `plan` before it is --list")
+  study.add_option("CONFIG", a.files, "YAML file of the study; `plan` before it means --list")
       ->required()
       ->expected(1, 2);
-  study.add_option("--out", a.out, "folder for the trials; a study there goes on");
+  study.add_option("--out", a.out, "folder for the trials; a study in it continues");
   study.add_option("--jobs", a.run.jobs, "trials at a time")->check(CLI::Range(1, 1024));
-  study.add_option("--shard", a.shard, "I/N: only every N-th trial from the I-th (from 0)");
-  study.add_option("--cache", a.run.cache, "folder for implicit faces that other calls can take");
+  study.add_option("--shard", a.shard,
+                   "I/N: only every N-th trial, starting with trial I (from 0)");
+  study.add_option("--cache", a.run.cache,
+                   "folder of implicit faces, to share them with other calls");
   study
       .add_option("--cache-limit-mb", a.run.cache_limit_mb,
                   "size above which the oldest files of the cache are deleted")
@@ -274,22 +256,23 @@ void DeclareStudy(CLI::App& study, CommandLine& line) {
       "and rounds >= 2\"; = != < <= > >=, ~ with * and ?, and, or, not, ( )");
   study
       .add_option("--rerun", a.rerun,
-                  "run again although it is there: failed; unusable, and what failed; all")
+                  "run finished trials again: failed; unusable (and failed); all")
       ->check(CLI::IsMember({"failed", "unusable", "all"}));
-  study.add_flag("--quiet", a.quiet, "no progress");
+  study.add_flag("--quiet", a.quiet, "do not show progress");
 }
 
 void DeclareSubmit(CLI::App& submit, CommandLine& line) {
   StudyArguments& a = *Bind(submit, line, &SubmitCommand);
   submit.add_option("CONFIG", a.files, "YAML file of the study")->required()->expected(1);
-  submit.add_flag("--slurm", a.slurm, "the cluster's engine; the only one so far")->required();
+  submit.add_flag("--slurm", a.slurm, "the scheduler of the cluster; no other is supported")
+      ->required();
   submit.add_option("--out", a.out, "folder for the trials, which every node must see");
   submit
       .add_option("--shards", a.submit.shards,
-                  "elements of the array; each should have work for 30 s or more")
+                  "number of elements of the array; each should have 30 s of work or more")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  submit.add_option("--jobs", a.submit.jobs, "trials at a time in each")
+  submit.add_option("--jobs", a.submit.jobs, "trials at a time in each element")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   submit
@@ -317,19 +300,19 @@ void DeclareCompare(CLI::App& compare, CommandLine& line) {
       ->required()
       ->expected(2, 100);
   compare.add_option("--metric", a.metric,
-                     "number of result.json by its path; else that of the first study");
+                     "number of result.json by its path; default: the metric of the first study");
   compare
       .add_option("--better", a.better,
-                  "which values of the metric are better; else as the studies took it, or as its "
-                  "name says: higher for shares within a distance, nearest to 0 for signed errors, "
-                  "nearest to the stated share for coverage, lower for all others")
+                  "which values of the metric are better; default by its name: higher for shares "
+                  "within a distance, nearest to 0 for signed errors, nearest to the stated share "
+                  "for coverage, lower for all others")
       ->check(CLI::IsMember({"lower", "higher", "nearest"}));
   CLI::Option* const out =
       compare.add_option("--out", a.out, "folder for pairs.csv, values.csv and report.html");
   compare
       .add_flag("--ranks", a.ranks,
-                "print instead how alike the studies order the treatments that they share, each "
-                "over its own subjects, which may be others")
+                "print instead how similarly the studies rank the treatments that they share, each "
+                "over its own subjects, which may differ")
       ->excludes(out);
   compare.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");
@@ -346,7 +329,7 @@ std::span<const ProgramCommand> StudyCommands() {
                      &DeclareMerge},
       ProgramCommand{"compare", "compare the treatments of studies over the subjects they share",
                      &DeclareCompare},
-      ProgramCommand{"status", "say how far a study has come", &DeclareStatus},
+      ProgramCommand{"status", "show the progress of a study", &DeclareStatus},
   };
   return kCommands;
 }

@@ -45,7 +45,7 @@ std::vector<std::pair<std::string, CrossValidation>> LeaveOut(const Experiment& 
   return left_out;
 }
 
-const char* InWords(DepthStatus status) {
+const char* StatusWord(DepthStatus status) {
   return status == DepthStatus::kAssigned  ? "assigned"
          : status == DepthStatus::kOutside ? "outside"
                                            : "not_facing";
@@ -66,7 +66,7 @@ std::string TruthText(const DepthComparison& truth) {
   return text + SummaryLine("  the depth's end", truth.tips);
 }
 
-// Of the true depth, by distance, and the model fitted to it.
+// Writes the variogram of the true depth by distance, and the model fitted to it.
 std::string VariogramText(const DepthComparison& truth) {
   std::string distances, values;
   for (const VariogramBin& bin : truth.variogram) {
@@ -91,7 +91,7 @@ std::string SharesText(const DepthField& depth) {
   return text.empty() ? "" : text + "\n";
 }
 
-// What the scheme took the depths for.
+// Writes the parameters of the random process that kriging assumed.
 std::string ProcessText(const DepthField& depth) {
   if (!depth.process) {
     return "";
@@ -101,7 +101,7 @@ std::string ProcessText(const DepthField& depth) {
                   depth.process->mean_mm, depth.process->signal_mm, depth.process->length_mm,
                   depth.process->nugget_mm);
   for (const std::string& words : depth.process->at_end) {
-    text += fmt::format("  {}: the dowels do not tell it\n", words);
+    text += fmt::format("  {}: the dowels do not determine it\n", words);
   }
   return text;
 }
@@ -116,7 +116,7 @@ std::string ScoresLine(const std::string& what, const DepthScores& s) {
                    100 * s.coverage_50, 100 * s.coverage_90, 100 * s.coverage_95);
 }
 
-// What the stated standard deviations are worth.
+// Writes the scores of the stated standard deviations.
 std::string ScoresText(const DepthResult& result) {
   std::string lines;
   if (result.truth) {
@@ -151,8 +151,8 @@ std::string DepthPly(const DepthResult& result) {
   return EncodeMesh(result.stage->shell, ".ply", attributes);
 }
 
-// The shell moved by its depth, where it has one at all three corners (thesis 2.2: the soft tissue
-// at p + depth * direction).
+// Writes the triangles of the shell whose three corners have a depth, moved by that depth (thesis
+// 2.2: the soft tissue is at p + depth * direction).
 std::string TipsPly(const DepthResult& result) {
   TriMesh tips = result.stage->shell;
   const std::vector<double>& depth_mm = result.stage->depth.depth_mm;
@@ -187,7 +187,7 @@ DepthResult MeasureDepth(const Experiment& experiment, const RunContext& context
   result.stage = MakeDepthStage(experiment, cache ? *cache : own_cache, step, context);
   const DepthStage& stage = *result.stage;
   result.depth = stage.depth;
-  if (!std::holds_alternative<DepthMap>(experiment.interp)) {  // no dowel has a part in a map
+  if (!std::holds_alternative<DepthMap>(experiment.interp)) {  // a map does not use dowels
     result.left_out =
         step("leave dowels out", [&] { return LeaveOut(experiment, stage, context); });
   }
@@ -230,7 +230,7 @@ std::string LeftOutCsv(const DepthResult& result) {
     for (const LeftOut& out : left_out.left_out) {
       const char* const part = IsStandardSite(out.site) ? kFaceParts[FacePartOfSite(out.site)] : "";
       csv.Row(kind, out.site, WithoutSide(out.site), part, out.depth_mm, out.predicted_mm,
-              out.error_mm, out.sd_mm, out.within_90, InWords(out.status));
+              out.error_mm, out.sd_mm, out.within_90, StatusWord(out.status));
     }
   }
   return csv.Text();
@@ -256,10 +256,10 @@ std::string DepthText(const DepthResult& result) {
 }
 
 std::vector<Legend> DepthPictureLegends(bool has_truth) {
-  constexpr double kDeepest_mm = 25, kWorst_mm = 4;
-  std::vector<Legend> legends = {{SequentialMap(0, kDeepest_mm), "interpolated tissue depth"}};
+  constexpr double kMaxDepth_mm = 25, kMaxError_mm = 4;  // ends of the colour scales
+  std::vector<Legend> legends = {{SequentialMap(0, kMaxDepth_mm), "interpolated tissue depth"}};
   if (has_truth) {
-    legends.push_back({DivergingMap(kWorst_mm), "too deep (+) or not deep enough (-)"});
+    legends.push_back({DivergingMap(kMaxError_mm), "too deep (+) or not deep enough (-)"});
   }
   return legends;
 }

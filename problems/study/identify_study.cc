@@ -20,7 +20,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using KnownFaces = std::vector<KnownFace>;
 
-// The triangles whose corners may all be measured to.
+// The triangles whose three corners are outer skin, to which distances are measured.
 TriMesh OuterPart(const TriMesh& skin, const FaceRegion& region) {
   if (region.outer.empty()) {
     return skin;
@@ -32,7 +32,7 @@ TriMesh OuterPart(const TriMesh& skin, const FaceRegion& region) {
   return Submesh(skin, keep);
 }
 
-// In front of the landmarks; those without a skin there are left out.
+// The points of the skin in front of the landmarks. Landmarks without skin in front are left out.
 SkinPoints PointsOn(const std::vector<Dowel>& dowels, const std::vector<SiteError>& sites,
                     double SiteError::*depth_mm) {
   SkinPoints points;
@@ -45,8 +45,8 @@ SkinPoints PointsOn(const std::vector<Dowel>& dowels, const std::vector<SiteErro
   return points;
 }
 
-// What decides a gallery.
-std::string TextOf(const std::vector<GalleryEntry>& gallery) {
+// The cache key of a gallery.
+std::string GalleryKey(const std::vector<GalleryEntry>& gallery) {
   std::string text;
   for (const GalleryEntry& entry : gallery) {
     text += entry.name + "\n" + WriteConfig(entry.experiment);
@@ -56,7 +56,7 @@ std::string TextOf(const std::vector<GalleryEntry>& gallery) {
 
 std::shared_ptr<const KnownFaces> MakeGallery(const std::vector<GalleryEntry>& gallery,
                                               const RunContext& context, StageCache& cache) {
-  return cache.Get<KnownFaces>("gallery\n" + TextOf(gallery), [&] {
+  return cache.Get<KnownFaces>("gallery\n" + GalleryKey(gallery), [&] {
     KnownFaces faces;
     for (const GalleryEntry& entry : gallery) {
       faces.push_back(MakeKnownFace(entry, context));
@@ -65,7 +65,7 @@ std::shared_ptr<const KnownFaces> MakeGallery(const std::vector<GalleryEntry>& g
   });
 }
 
-Match MatchOf(const std::vector<double>& distances_mm, std::size_t own) {
+Match MakeMatch(const std::vector<double>& distances_mm, std::size_t own) {
   Match match{.rank = RankOf(distances_mm, own), .own_mm = distances_mm[own]};
   for (std::size_t k = 0; k < distances_mm.size(); ++k) {
     if (k != own) {
@@ -75,12 +75,12 @@ Match MatchOf(const std::vector<double>& distances_mm, std::size_t own) {
   return match;
 }
 
-// Of a face from everyone in the gallery.
+// Distances of a face from everyone in the gallery.
 struct Distances {
   std::vector<double> surface_mm, landmarks_mm;
 
   ProbeMatch MatchWith(std::size_t own) const {
-    return {.surface = MatchOf(surface_mm, own), .landmarks = MatchOf(landmarks_mm, own)};
+    return {.surface = MakeMatch(surface_mm, own), .landmarks = MakeMatch(landmarks_mm, own)};
   }
 };
 
@@ -134,7 +134,7 @@ KnownFace MakeKnownFace(const GalleryEntry& entry, const RunContext& context) {
   const Case person = MakeCase(LoadSubject(entry.experiment.subject, context), entry.experiment);
   if (!person.skin) {
     throw InputError(fmt::format(
-        "gallery: {} has no true skin to be recognised by; give subject.skin, or take it out",
+        "gallery: {} has no true skin for comparison; give subject.skin, or take this person out",
         entry.name));
   }
   KnownFace known{.name = entry.name,
@@ -151,13 +151,13 @@ IdentifyResult Identify(const Experiment& experiment, const std::vector<GalleryE
                         std::size_t own, const IdentifyOptions& options, const RunContext& context,
                         StageCache& cache) {
   const auto faces = MakeGallery(gallery, context, cache);
-  const std::string key = TextOf(gallery);
+  const std::string key = GalleryKey(gallery);
   const auto ceiling = cache.Get<Distances>(fmt::format("ceiling {}\n{}", own, key), [&] {
     return Compare(SeenAgain((*faces)[own], options.ceiling_cell_mm, options.ceiling_noise_mm,
                              options.random_seed + own),
                    *faces, context);
   });
-  // The distances of the generic face do not know whose face is asked for; the rank does.
+  // The distances of the generic face are the same for all persons; only the rank depends on `own`.
   const auto floor =
       cache.Get<Distances>(fmt::format("floor\n{}{}", TemplateText(experiment), key),
                            [&] { return Compare(GenericFace(experiment), *faces, context); });

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether the face made of a skull is recognised among others (`job: identify`).
+// Tests whether the face made from a skull is recognised among others (`job: identify`).
 #pragma once
 
 #include <memory>
@@ -13,9 +13,9 @@
 
 namespace semblance {
 
-// How close a probe is to its person and to the others, by one measure.
+// The distance of a probe to its person and to the others, by one measure.
 struct Match {
-  double rank = kNaN;  // RankOf
+  double rank = kNaN;  // rank of the person by distance (RankOf)
   double own_mm = kNaN;
   double best_other_mm = kNaN;  // NaN in a gallery of one
 };
@@ -28,22 +28,23 @@ struct ProbeMatch {
 struct IdentifyResult {
   RunResult run;
   int gallery = 0;
-  ProbeMatch approximation = {};  // the face that was made
-  ProbeMatch ceiling = {};        // the true face, seen again (SeenAgain)
+  ProbeMatch approximation = {};  // the recovered face
+  ProbeMatch ceiling = {};        // the true face, resampled and noisy (SeenAgain)
   ProbeMatch floor = {};          // the generic face, the same for everyone
 };
 
-// Throws InputError if the person has no true skin or no landmarks with directions.
+// Loads the true face of a person. Throws InputError if the person has no true skin or no landmarks
+// with directions.
 KnownFace MakeKnownFace(const GalleryEntry& entry, const RunContext& context);
 
-// Runs the experiment, which is that of gallery[own], and compares its face, the ceiling's and the
-// floor's with everyone's. What all trials need of a person is taken from `cache`. Throws as Run,
-// MakeKnownFace and DistanceOf.
+// Runs the experiment, which must be that of gallery[own]. Compares its face, the ceiling and the
+// floor with every true face. `cache` shares the data of a person among trials. Throws as Run,
+// MakeKnownFace and DistanceOf do.
 IdentifyResult Identify(const Experiment& experiment, const std::vector<GalleryEntry>& gallery,
                         std::size_t own, const IdentifyOptions& options, const RunContext& context,
                         StageCache& cache);
 
-// ResultJson of the run with identify{gallery, chance_rank, surface{rank, own_mm, best_other_mm},
+// ResultJson of the run, with identify{gallery, chance_rank, surface{rank, own_mm, best_other_mm},
 // landmarks{}, ceiling{surface{}, landmarks{}}, floor{}}.
 nlohmann::ordered_json IdentifyResultJson(const Experiment& experiment,
                                           const IdentifyResult& result);

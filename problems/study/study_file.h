@@ -1,26 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the YAML file of a study says:
+// The YAML file of a study, and the rows of settings that it expands to:
 //
 //     title: ...
 //     base: ../phantom.yaml            # the experiment that the trials vary
 //     set: {implicit.resolution: 75}   # for all trials
-//     subjects:                        # each with what it changes; without it, the base's own
+//     subjects:                        # each with its changes; left out: the base's own subject
 //       - {name: a, set: {subject.random_seed: 1}}
-//       - {name: b, base: ../cranium.yaml, optional: true}   # skipped where its files are missing
+//       - {name: b, base: ../cranium.yaml, optional: true}   # skipped if its files are missing
 //     grid: {interp: [nearest, mean], implicit.resolution: [40, 60]}   # every combination
 //     zip: {fit.features: [restore, free], title: [a, b]}              # side by side
 //     list: [{seeds.level: 1}, {seeds.level: 2, rounds: 2}]            # by hand
 //     sample: {method: lhs, n: 20, random_seed: 1, ranges: {seeds.weight: [0.1, 1.0]}}
-//     search: {method: bayes, budget: 30, ranges: {seeds.weight: {low: 0.1, high: 1.0}}}
-//     tags: [paper, 2026]              # words that people find it by
-//     metric: face.rms_mm              # that the report ranks by
+//     tags: [paper, 2026]              # words to find the study by
+//     metric: face.rms_mm              # the report ranks by it
 //     keep: summary
 //     job: face
 //     identify: {others: [{name: c, set: {subject.random_seed: 3}}]}   # for job: identify
 //
-// Each of grid, zip, list and sample gives rows; a trial is a subject with one row of each. A value
-// is any part of an experiment, be it a number or a whole strategy. A search, instead of them,
-// finds its rows as it goes: which is next depends on what those before gave.
+// Each of grid, zip, list and sample gives rows of settings. A trial is a subject with one row of
+// each. A value is any part of an experiment: a number, or a whole strategy.
 #pragma once
 
 #include <array>
@@ -31,10 +29,7 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/config/config_errors.h"
 #include "problems/config/config_tree.h"
-#include "problems/search/search_method.h"
-#include "problems/search/unit_samples.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {
@@ -54,75 +49,92 @@ constexpr auto EnumNames(StudyJob) {
 }
 
 struct StudySubject {
-  std::string name;            // unique in the study
-  std::filesystem::path base;  // laid over the study's base; empty: none
-  OptionValues set;            // laid over both, and over the study's own `set`
-  bool optional = false;       // not the default: a study that lacks a subject says something else
-  std::vector<std::string> tags;  // words that --only can ask for, e.g. [phantom]
+  std::string name;
+  std::filesystem::path base;  // empty: none
+  OptionValues set;
+  bool optional = false;  // not the default: a study without one of its subjects is another study
+  std::vector<std::string> tags;
 };
 template <class Visitor>
 void Fields(Visitor& visit, StudySubject& o) {
-  visit(FieldInfo{.name = "name", .doc = "of the subject; no two have the same"}, o.name);
-  visit(FieldInfo{.name = "base", .doc = "file of an experiment, laid over the study's base"},
+  visit(FieldInfo{.name = "name", .doc = "name of the subject; each subject has its own"}, o.name);
+  visit(FieldInfo{.name = "base", .doc = "file of an experiment, merged over the study's base"},
         o.base);
-  visit(FieldInfo{.name = "set", .doc = "values by option path, for this subject"}, o.set);
-  visit(FieldInfo{.name = "optional",
-                  .doc = "skip the subject where its files are missing, and say so, rather than "
-                         "refuse the study"},
-        o.optional);
+  visit(
+      FieldInfo{
+          .name = "set",
+          .doc = "values by option path, for this subject; merged over both bases and the study's "
+                 "own set"},
+      o.set);
+  visit(
+      FieldInfo{.name = "optional",
+                .doc = "skip the subject with a note if its files are missing, rather than refuse "
+                       "the study"},
+      o.optional);
   visit(FieldInfo{.name = "tags",
-                  .doc = "words of one's own, e.g. [phantom, broken], for `study --only 'tag = "
-                         "phantom'`"},
+                  .doc = "free words, e.g. [phantom, broken], for `study --only 'tag = phantom'`"},
         o.tags);
 }
 
-// The gallery is the study's subjects and these others; everyone in it has a true skin.
+// The gallery is the study's subjects and these others; everyone in it has a true skin. The ceiling
+// compares a person's true face with itself, resampled and noisy as in another scan.
 struct IdentifyOptions {
-  std::vector<StudySubject> others;  // whom no trial asks for
-  double ceiling_cell_mm = 3;        // the ceiling is the true face in vertices so far apart,
-  double ceiling_noise_mm = 0.5;     // each off by so much (rms): what another scan would show
-  std::uint64_t random_seed = 1;     // of the noise
+  std::vector<StudySubject> others;
+  double ceiling_cell_mm = 3;
+  double ceiling_noise_mm = 0.5;
+  std::uint64_t random_seed = 1;
 };
 template <class Visitor>
 void Fields(Visitor& visit, IdentifyOptions& o) {
-  visit(FieldInfo{.name = "others",
-                  .doc = "people of the gallery beside the study's subjects, whom no trial asks "
-                         "for: name, base and set as those have"},
-        o.others);
   visit(
-      FieldInfo{.name = "ceiling_cell_mm",
-                .unit = "mm",
-                .min = 0.1,
-                .max = 20,
-                .doc = "of the ceiling, the true face seen again: how far its vertices are apart"},
+      FieldInfo{.name = "others",
+                .doc = "further people of the gallery, for whom there is no trial: name, base and "
+                       "set as for subjects"},
+      o.others);
+  visit(
+      FieldInfo{
+          .name = "ceiling_cell_mm",
+          .unit = "mm",
+          .min = 0.1,
+          .max = 20,
+          .doc = "distance between the vertices of the ceiling, the true face in another scan"},
       o.ceiling_cell_mm);
   visit(FieldInfo{.name = "ceiling_noise_mm",
                   .unit = "mm",
                   .min = 0,
                   .max = 20,
-                  .doc = "of the ceiling: rms by which each vertex is off along its normal"},
+                  .doc = "rms error of each vertex of the ceiling along its normal"},
         o.ceiling_noise_mm);
-  visit(FieldInfo{.name = "random_seed", .doc = "of the ceiling's noise"}, o.random_seed);
+  visit(FieldInfo{.name = "random_seed", .doc = "seed of the ceiling's noise"}, o.random_seed);
 }
 
+// kLhs: a Latin hypercube, one point in each of n equal slices of each axis (McKay et al. 1979).
+// kSobol: the first n points of Sobol's sequence after its origin.
+enum class SampleMethod { kLhs, kSobol };
+constexpr auto EnumNames(SampleMethod) { return std::to_array<std::string_view>({"lhs", "sobol"}); }
+
 struct StudySamples {
-  SampleMethod method = SampleMethod::kLhs;  // covers each axis evenly whatever n is; sobol is best
-                                             // for powers of two
-  int n = 0;                                 // must be given
-  std::uint64_t random_seed = 1;             // of lhs
-  ConfigMap<std::array<ConfigNode, 2>> ranges;  // lowest and highest; as they are written, because
-                                                // [1, 5] asks for whole numbers and [1.0, 5.0] not
+  SampleMethod method = SampleMethod::kLhs;
+  int n = 0;  // must be given
+  std::uint64_t random_seed = 1;
+  // Lowest and highest number, as written: [1, 5] means whole numbers, [1.0, 5.0] any numbers.
+  ConfigMap<std::array<ConfigNode, 2>> ranges;
 };
 template <class Visitor>
 void Fields(Visitor& visit, StudySamples& o) {
-  visit(FieldInfo{.name = "method", .doc = "Latin hypercube, or Sobol's sequence"}, o.method);
-  visit(FieldInfo{.name = "n", .min = 1, .max = 100000, .doc = "how many samples; must be given"},
+  visit(
+      FieldInfo{.name = "method",
+                .doc = "lhs, a Latin hypercube, covers each axis evenly for any n; sobol, Sobol's "
+                       "sequence, is best if n is a power of two"},
+      o.method);
+  visit(FieldInfo{.name = "n", .min = 1, .max = 100000, .doc = "number of samples; must be given"},
         o.n);
-  visit(FieldInfo{.name = "random_seed", .doc = "of lhs; sobol draws no random numbers"},
+  visit(FieldInfo{.name = "random_seed", .doc = "seed of lhs; sobol draws no random numbers"},
         o.random_seed);
   visit(FieldInfo{.name = "ranges",
-                  .doc = "lowest and highest number by option path; where both are written without "
-                         "a point, so are the samples"},
+                  .doc =
+                      "lowest and highest number by option path; if both are whole numbers, so are "
+                      "the samples"},
         o.ranges);
 }
 template <class Report>
@@ -135,166 +147,93 @@ void CheckValue(Report& report, const StudySamples& o) {
   }
 }
 
-// Which values of a metric a search is for: those at an end, or those nearest to what it should be.
-enum class Better { kLower, kHigher, kNearest };
-constexpr auto EnumNames(Better) {
-  return std::to_array<std::string_view>({"lower", "higher", "nearest"});
-}
-
-struct SearchedNumber {
-  ConfigNode low, high;  // as they are written, because 1 and 5 ask for whole numbers and 1.0 not
-  bool log = false;      // spread by the logarithm
-};
-template <class Visitor>
-void Fields(Visitor& visit, SearchedNumber& o) {
-  visit(FieldInfo{.name = "low",
-                  .doc = "lowest number; where both ends are written without a point, only whole "
-                         "numbers are tried"},
-        o.low);
-  visit(FieldInfo{.name = "high", .doc = "highest number"}, o.high);
-  visit(FieldInfo{.name = "log",
-                  .doc = "spread by the logarithm, for what counts by its factor, as weights and "
-                         "tolerances do; both ends must be above 0"},
-        o.log);
-}
-
-struct StudySearch {
-  SearchMethod method = BayesSearch{};  // the least runs where a treatment costs minutes
-  int budget = 0;                       // must be given
-  std::uint64_t random_seed = 1;        // of whatever the method draws
-  std::string metric;                   // empty: the study's
-  std::optional<Better> better;         // none: as the metric says of itself
-  ConfigMap<SearchedNumber> ranges;     // numbers, by option path
-  OptionAxes choices;                   // values without an order, by option path
-  std::vector<StudySubject> held_out;   // empty: what is found is as good as it looks to itself
-};
-template <class Visitor>
-void Fields(Visitor& visit, StudySearch& o) {
-  visit(FieldInfo{.name = "method",
-                  .doc = "bayes: a Gaussian process, for few and costly treatments; cmaes: a cloud "
-                         "that moves, for a hundred or more over numbers; halving: many short "
-                         "runs, the best of them longer; random: what a search must beat"},
-        o.method);
-  visit(FieldInfo{.name = "budget",
-                  .min = 1,
-                  .max = 100000,
-                  .doc = "treatments to try, each on all subjects; short runs of halving count by "
-                         "their length; must be given"},
-        o.budget);
-  visit(FieldInfo{.name = "random_seed", .doc = "of whatever the method draws"}, o.random_seed);
-  visit(FieldInfo{.name = "metric",
-                  .doc = "a number of result.json by its path, whose mean over subjects is "
-                         "searched; the report ranks by it; left out, the study's metric"},
-        o.metric);
-  visit(
-      FieldInfo{.name = "better",
-                .doc = "which values of the metric are better; left out, higher for shares within "
-                       "a distance, as face.within_2_5mm, nearest to 0 for signed errors, nearest "
-                       "to the stated share for coverage_50, _90 and _95, and lower for all "
-                       "others"},
-      o.better);
-  visit(FieldInfo{.name = "ranges",
-                  .doc = "numbers by option path, as in {seeds.weight: {low: 0.1, high: 10.0, log: "
-                         "true}}"},
-        o.ranges);
-  visit(FieldInfo{.name = "choices",
-                  .min = 2,
-                  .doc = "by option path, values without an order: words, or whole strategies"},
-        o.choices);
-  visit(FieldInfo{.name = "held_out",
-                  .doc = "subjects that the search never sees; at its end the best treatment and "
-                         "the base, as it stands, are run on them and compared: name, base, set "
-                         "and optional as of a subject"},
-        o.held_out);
-}
-template <class Report>
-void CheckValue(Report& report, const StudySearch& o) {
-  if (o.budget == 0) {
-    report("budget", "the number of treatments is missing; write it as in budget: 30");
-  }
-  if (o.ranges.entries.empty() && o.choices.entries.empty()) {
-    report("ranges",
-           "there is nothing to search; give ranges or choices, as in {seeds.weight: {low: 0.1, "
-           "high: 1.0}}");
-  }
-}
-
 struct StudyFile {
-  std::string title = "untitled";  // of the report
+  std::string title = "untitled";
   std::filesystem::path base;  // must be given: a study varies an experiment that runs by itself
-  OptionValues set;            // for all trials
-  std::vector<StudySubject> subjects;       // empty: the base's own subject
-  OptionAxes grid;                          // the last axis varies fastest
-  OptionAxes zip;                           // values side by side
-  std::vector<OptionValues> list;           // rows by hand
-  std::optional<StudySamples> sample;       // rows drawn from ranges
-  std::optional<StudySearch> search;        // instead of grid, zip, list and sample
-  std::vector<std::string> tags;            // that it is found by
-  std::string metric = "face.rms_mm";       // that the report ranks by
-  TrialFiles keep = TrialFiles::kSummary;   // the files of a run are some 30 MB, of a summary 10 kB
-  StudyJob job = StudyJob::kFace;           // face, depth, or identify
-  std::optional<IdentifyOptions> identify;  // of that job only; left out, its defaults
+  OptionValues set;
+  std::vector<StudySubject> subjects;  // empty: the base's own subject
+  OptionAxes grid;                     // the last axis varies fastest
+  OptionAxes zip;
+  std::vector<OptionValues> list;
+  std::optional<StudySamples> sample;
+  std::vector<std::string> tags;
+  std::string metric = "face.rms_mm";
+  TrialFiles keep = TrialFiles::kSummary;  // a run keeps some 30 MB, a summary 10 kB
+  StudyJob job = StudyJob::kFace;
+  std::optional<IdentifyOptions> identify;
 };
 template <class Visitor>
 void Fields(Visitor& visit, StudyFile& o) {
-  visit(FieldInfo{.name = "title", .doc = "what the report is headed with"}, o.title);
+  visit(FieldInfo{.name = "title", .doc = "title of the report"}, o.title);
   visit(FieldInfo{.name = "base", .doc = "file of the experiment that the trials vary"}, o.base);
   visit(FieldInfo{.name = "set", .doc = "values by option path, for all trials"}, o.set);
-  visit(FieldInfo{.name = "subjects",
-                  .min = 1,
-                  .doc = "what a result is averaged and tested over; left out, the base's own"},
-        o.subjects);
+  visit(
+      FieldInfo{
+          .name = "subjects",
+          .min = 1,
+          .doc = "the subjects that results are averaged and tested over; left out, the base's own "
+                 "subject"},
+      o.subjects);
   visit(
       FieldInfo{
           .name = "grid", .min = 1, .doc = "values by option path; every combination is a row"},
       o.grid);
-  visit(FieldInfo{.name = "zip",
-                  .min = 1,
-                  .doc = "values by option path, side by side: the first of each is a row, ..."},
-        o.zip);
-  visit(FieldInfo{.name = "list", .min = 1, .doc = "rows by hand: values by option path"}, o.list);
+  visit(
+      FieldInfo{.name = "zip",
+                .min = 1,
+                .doc = "lists of values by option path, of the same length: the first of each make "
+                       "the first row, and so on"},
+      o.zip);
+  visit(FieldInfo{.name = "list", .min = 1, .doc = "rows written out: values by option path"},
+        o.list);
   visit(FieldInfo{.name = "sample", .doc = "rows of numbers drawn from ranges"}, o.sample);
-  visit(FieldInfo{.name = "search",
-                  .doc = "instead of grid, zip, list and sample: treatments that are chosen by "
-                         "what those before gave, to find the best"},
-        o.search);
-  visit(FieldInfo{.name = "tags",
-                  .doc = "words of one's own that the study is found by; they stand in its report "
-                         "and in results.sqlite"},
-        o.tags);
+  visit(
+      FieldInfo{.name = "tags",
+                .doc = "free words to find the study by; its report and results.sqlite have them"},
+      o.tags);
   visit(FieldInfo{.name = "metric",
-                  .doc = "a number of result.json by its path, which the report ranks by: lower "
-                         "is better, but of shares within a distance, as face.within_2_5mm"},
+                  .doc = "the number that the report ranks by, as a path in result.json: higher is "
+                         "better for shares within a distance (face.within_2_5mm), nearest to its "
+                         "target for signed errors and coverages, lower for all others"},
         o.metric);
   visit(FieldInfo{.name = "keep",
-                  .doc = "of each trial: summary, the numbers; view, also what the report's 3-D "
-                         "view needs (job: depth: pictures of the first subject's depth maps); "
-                         "run, all files of a run"},
+                  .doc = "files kept per trial: summary, the numbers; view, also the faces for the "
+                         "report's 3-D view (job: depth: pictures of the first subject's depth "
+                         "maps); run, all files of a run"},
         o.keep);
-  visit(FieldInfo{.name = "job",
-                  .doc = "face; depth: the interpolated depth without a fit; identify: the face, "
-                         "and its rank among the subjects' true faces"},
-        o.job);
-  visit(FieldInfo{.name = "identify", .doc = "for job: identify"}, o.identify);
+  visit(
+      FieldInfo{.name = "job",
+                .doc =
+                    "face: a run per trial; depth: the interpolated depth without a fit; identify: "
+                    "a run, and the rank of the face among the subjects' true faces"},
+      o.job);
+  visit(FieldInfo{.name = "identify", .doc = "options of job: identify"}, o.identify);
 }
 template <class Report>
 void CheckValue(Report& report, const StudyFile& o) {
   if (o.identify && o.job != StudyJob::kIdentify) {
-    report("identify", "is for a study of that job only; set job: identify, or take it out");
-  }
-  const bool has_rows =
-      !o.grid.entries.empty() || !o.zip.entries.empty() || !o.list.empty() || o.sample.has_value();
-  if (o.search && has_rows) {
-    report("search",
-           "chooses the treatments itself; take out grid, zip, list and sample, or the search");
-  }
-  if (o.search && o.job == StudyJob::kIdentify && !o.search->held_out.empty()) {
-    report("search", "held_out: job: identify has one gallery for all; take held_out out");
+    report("identify", "only a study with job: identify has it; set that job, or take it out");
   }
 }
 
-// Throws IoError if the file cannot be read. What is wrong with it goes to `errors`; `tree` gets
-// what the file says, for the places of further faults.
+// Reads a study file. Adds its faults to `errors`, and stores its tree in `tree` for the locations
+// of later faults. Throws IoError if the file cannot be read.
 StudyFile ReadStudyFile(const std::filesystem::path& file, ConfigNode& tree, ConfigErrors& errors);
+
+using OptionSetting = OptionValues::Entry;
+using StudyRow = std::vector<OptionSetting>;
+
+// Returns a complaint if subjects and rows make more than 100,000 trials, else "". It only counts,
+// because a plan holds each trial with all options in memory.
+std::string ComplaintAboutSize(const StudyFile& study);
+
+// Expands the rows: every combination of one row each of grid, zip, list and sample, or one empty
+// row if there are none. Adds faults to `errors`.
+std::vector<StudyRow> MakeStudyRows(const StudyFile& study, ConfigErrors& errors);
+
+// Sets an option in an experiment's tree, with `defaults` as for SetPath. A path that does not
+// exist is an error at its location.
+void ApplySetting(const OptionSetting& setting, const ConfigNode& defaults, ConfigNode& tree,
+                  ConfigErrors& errors);
 
 }  // namespace semblance

@@ -25,7 +25,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Null is a number that is not known.
+// Adds the paths of all numbers. Null stands for a number that is not known.
 void AddNames(const Json& json, const std::string& path, std::set<std::string>& names) {
   if (json.is_number() || json.is_null()) {
     names.insert(path);
@@ -36,8 +36,8 @@ void AddNames(const Json& json, const std::string& path, std::set<std::string>& 
   }
 }
 
-// The results are those of no run at all, with every part that may be there: what writes them
-// names the numbers.
+// The names come from writing an empty result that has every optional part, so that they cannot
+// differ from those of real results.
 DepthComparison EmptyComparison() {
   DepthComparison comparison;
   for (DepthErrors* errors : {&comparison.along_direction, &comparison.closest}) {
@@ -57,8 +57,8 @@ FaceMetrics EmptyMetrics() {
   return metrics;
 }
 
-// A square of 1 mm, for what cannot be without a surface.
-HSplineSurface AnySurface() {
+// A square of 1 mm, because a run result must have a surface.
+HSplineSurface UnitSquare() {
   const HSplineShape shape{.patches_u = 1, .patches_v = 1, .max_level = 0};
   ControlNet net{.columns = shape.Columns(0), .rows = shape.Rows(0), .vertices = {}};
   for (int j = 0; j < net.rows; ++j) {
@@ -74,7 +74,7 @@ std::vector<SchemeShare> SharesOfEach(const std::variant<Schemes...>&) {
   return {{std::string(Schemes::kName), kNaN}...};
 }
 
-// Of kriging, which has a process, and of an average of all schemes at once.
+// A depth field with the numbers of kriging (its process) and of an average of all schemes.
 DepthField EmptyDepthOfAllKinds() {
   DepthField depth;
   depth.shares = SharesOfEach(SingleScheme());
@@ -83,7 +83,7 @@ DepthField EmptyDepthOfAllKinds() {
 }
 
 RunResult EmptyRun() {
-  const HSplineSurface surface = AnySurface();
+  const HSplineSurface surface = UnitSquare();
   RunResult result{.subject = {},
                    .shell = {},
                    .origin = {},
@@ -126,33 +126,43 @@ Json EmptyResultJson(StudyJob job) {
                                   : IdentifyResultJson(Experiment{}, {.run = EmptyRun()});
 }
 
-bool IsOneOfThem(const std::string& start, const std::set<std::string>& names) {
+// Lists the metrics of a job by dotted path, as in trials.csv. Metrics per landmark, feature and
+// left-out site are not listed, because they depend on the subject.
+std::set<std::string> ListMetrics(StudyJob job) {
+  std::set<std::string> names;
+  AddNames(EmptyResultJson(job), "", names);
+  return names;
+}
+
+// Returns true if a name begins with `start`.
+bool HasPrefix(const std::string& start, const std::set<std::string>& names) {
   const auto first = names.lower_bound(start);
   return first != names.end() && first->starts_with(start);
 }
 
-// What a subject has for each of its landmarks, features and regions, and beside numbers that every
-// subject has: a kind of cross-validation that there is not has no site.
-bool IsOfOneSubject(const std::string& metric, const std::set<std::string>& names) {
+// Returns true for a metric per landmark, feature, site or region, in a group of metrics that the
+// job has. Which landmarks, features and sites exist depends on the subject.
+bool DependsOnSubject(const std::string& metric, const std::set<std::string>& names) {
   constexpr std::array kGroups = {".landmarks.", ".features.", ".sites.", ".feature_distortion.",
                                   ".coverage_90_of."};
   const auto has = [&](const char* group) {
     const std::size_t at = metric.find(group);
-    return at != metric.npos && IsOneOfThem(metric.substr(0, at + 1), names);
+    return at != metric.npos && HasPrefix(metric.substr(0, at + 1), names);
   };
   return std::ranges::any_of(kGroups, has) ||
          (metric.starts_with("cross_validation.") && has(".regions."));
 }
 
-// "depth.shares.kriging matern_5_2", of a scheme that stands there with several options.
+// Returns true for "depth.shares.kriging matern_5_2": the share of a scheme with other options.
 bool IsShareWithOptions(const std::string& metric, const std::set<std::string>& names) {
   const std::size_t blank = metric.find(' ');
   return metric.starts_with("depth.shares.") && blank != metric.npos && blank + 1 < metric.size() &&
          names.contains(metric.substr(0, blank));
 }
 
-// A dowel may be the experiment's own, of any name; but one of a pair has a side.
-std::string ComplaintAboutSiteIn(const std::string& metric) {
+// Complains about a paired site without its side. Other names are allowed, because an experiment
+// can name its own dowels.
+std::string ComplaintAboutSite(const std::string& metric) {
   constexpr std::string_view kGroup = ".sites.";
   const std::size_t at = metric.find(kGroup);
   const std::string site = at == metric.npos ? "" : metric.substr(at + kGroup.size());
@@ -161,25 +171,19 @@ std::string ComplaintAboutSiteIn(const std::string& metric) {
   };
   return site.empty() || is_site(site) || !is_site(site + "_l")
              ? ""
-             : fmt::format("no trial has a number '{}': '{}' is of a pair; write {}_l or {}_r",
+             : fmt::format("no trial has a number '{}': '{}' is a paired site; write {}_l or {}_r",
                            metric, site, site, site);
 }
 
 }  // namespace
 
-std::set<std::string> MetricsOf(StudyJob job) {
-  std::set<std::string> names;
-  AddNames(EmptyResultJson(job), "", names);
-  return names;
-}
-
 std::string ComplaintAboutMetric(const std::string& metric, StudyJob job) {
-  const std::set<std::string> names = MetricsOf(job);
+  const std::set<std::string> names = ListMetrics(job);
   if (names.contains(metric) || IsShareWithOptions(metric, names)) {
     return "";
   }
-  if (IsOfOneSubject(metric, names)) {
-    return ComplaintAboutSiteIn(metric);
+  if (DependsOnSubject(metric, names)) {
+    return ComplaintAboutSite(metric);
   }
   const std::vector<std::string> known(names.begin(), names.end());
   const std::string nearest = NearestWord(metric, known);
@@ -200,34 +204,35 @@ bool NeedsTrueSkin(const std::string& metric) {
 
 namespace {
 
-// The last name of a path.
-std::string LeafOf(const std::string& metric) {
+// The last part of a path.
+std::string LastPart(const std::string& metric) {
   const std::size_t dot = metric.rfind('.');
   return dot == metric.npos ? metric : metric.substr(dot + 1);
 }
 
-// The share that it should be, e.g. 0.9 of coverage_90 and coverage_90_of.nose; none of others.
-std::optional<double> ShareToHold(const std::string& metric) {
+// The share that a coverage should have, e.g. 0.9 for coverage_90 and coverage_90_of.nose. Nothing
+// for other metrics.
+std::optional<double> StatedShare(const std::string& metric) {
   for (const auto& [name, share] : std::to_array<std::pair<const char*, double>>(
            {{"coverage_50", 0.5}, {"coverage_90", 0.9}, {"coverage_95", 0.95}})) {
-    if (LeafOf(metric) == name || metric.find(fmt::format(".{}_of.", name)) != metric.npos) {
+    if (LastPart(metric) == name || metric.find(fmt::format(".{}_of.", name)) != metric.npos) {
       return share;
     }
   }
   return std::nullopt;
 }
 
-// With a sign that tells too thick from too thin.
+// Returns true for errors with a sign: too thick or too thin.
 bool IsSigned(const std::string& metric) {
-  return LeafOf(metric) == "mean_signed_mm" || LeafOf(metric) == "bias_mm" ||
+  return LastPart(metric) == "mean_signed_mm" || LastPart(metric) == "bias_mm" ||
          (metric.starts_with("cross_validation.") && metric.find(".sites.") != metric.npos);
 }
 
 }  // namespace
 
 Better BetterOf(const std::string& metric) {
-  return LeafOf(metric).starts_with("within_")     ? Better::kHigher
-         : IsSigned(metric) || ShareToHold(metric) ? Better::kNearest
+  return LastPart(metric).starts_with("within_")   ? Better::kHigher
+         : IsSigned(metric) || StatedShare(metric) ? Better::kNearest
                                                    : Better::kLower;
 }
 
@@ -255,8 +260,8 @@ std::string Preference::OfWhat() const {
   return better == Better::kNearest ? fmt::format(", distance from {}", target) : "";
 }
 
-Preference PreferenceFor(const std::string& metric, std::optional<Better> said) {
-  return {.better = said.value_or(BetterOf(metric)), .target = ShareToHold(metric).value_or(0)};
+Preference PreferenceFor(const std::string& metric, std::optional<Better> given) {
+  return {.better = given.value_or(BetterOf(metric)), .target = StatedShare(metric).value_or(0)};
 }
 
 }  // namespace semblance

@@ -1,47 +1,52 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The numbers that a trial can have, known before any has run.
+// The numbers that a trial can have, known before any trial has run.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "problems/study/study_file.h"
 
 namespace semblance {
 
-// By dotted path, as in trials.csv. What is there for each landmark, feature and left-out site is
-// left out: which there are, a subject decides.
-std::set<std::string> MetricsOf(StudyJob job);
-
-// What is wrong with it, and what may be meant; empty where a trial of the job can have the metric.
+// Returns "" if a trial of the job can have the metric, else a complaint with the nearest name.
 std::string ComplaintAboutMetric(const std::string& metric, StudyJob job);
 
-// Whether the metric measures against the true skin, so that a subject without one has no such
-// number.
+// Returns true if the metric compares with the true skin, so that a subject without one lacks it.
 bool NeedsTrueSkin(const std::string& metric);
 
-// Which of its values are better: higher of shares within a distance, as face.within_2_5mm; nearest
-// to 0 of signed errors (mean_signed_mm, bias_mm, a site's when it was left out), to the share that
-// is stated of coverage_50, _90 and _95; of all others lower.
+// Which values of a metric are better: those at one end, or those nearest to a target.
+enum class Better { kLower, kHigher, kNearest };
+constexpr auto EnumNames(Better) {
+  return std::to_array<std::string_view>({"lower", "higher", "nearest"});
+}
+
+// Decides by the name of the metric: higher for shares within a distance (face.within_2_5mm),
+// nearest for signed errors (mean_signed_mm, bias_mm, the error of a left-out site) and for
+// coverage_50, _90 and _95, lower for all others.
 Better BetterOf(const std::string& metric);
 
-// The same with what is meant by nearest.
+// Which values of a metric are better, with the target of kNearest.
 struct Preference {
   Better better = Better::kLower;
-  double target = 0;  // of kNearest
+  double target = 0;  // only for kNearest
 
-  // Of which less is better. A treatment's is the mean over its subjects: errors of either sign do
-  // not make up for each other.
+  // Less cost is better. The cost of a treatment is the mean over its subjects, so that errors of
+  // opposite sign do not cancel.
   double CostOf(double value) const;
-  // What differences and curves are of: the value; of kNearest its distance from the target.
+  // The quantity of differences and curves: the value, or for kNearest its distance from the
+  // target.
   double Compared(double value) const;
-  bool IsBetter(double compared, double than) const;  // of two such
+  bool IsBetter(double compared, double than) const;  // for two results of Compared
   std::string InWords() const;                        // "nearest to 0.9 is better"
-  std::string OfWhat() const;  // behind the metric: ", distance from 0.9"; "" of the others
+  std::string OfWhat() const;  // suffix to the metric: ", distance from 0.9", or "" unless kNearest
 };
 
-// said: by the study or the user; then the target is still the metric's own, 0 of most.
-Preference PreferenceFor(const std::string& metric, std::optional<Better> said = std::nullopt);
+// Takes `given` (the user's choice) or the default of the metric. The target is that of the metric:
+// the stated share of a coverage, else 0.
+Preference PreferenceFor(const std::string& metric, std::optional<Better> given = std::nullopt);
 
 }  // namespace semblance

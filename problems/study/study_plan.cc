@@ -8,21 +8,136 @@
 #include <iterator>
 #include <map>
 #include <set>
+#include <sstream>
 
 #include "problems/config/config_reader.h"
 #include "problems/config/value_filter.h"
 #include "problems/inputs/input_files.h"
+#include "problems/output/file_hashes.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/study/study_metrics.h"
-#include "problems/study/study_rows.h"
 
 namespace semblance {
 namespace {
 
 namespace fs = std::filesystem;
 
-// The experiments' trees that a study file names and edits. Faults go to `errors`.
+// A subject of the study, with the tree of the experiment that its trials vary.
+struct SubjectTree {
+  std::string name;
+  ConfigNode tree;
+  bool optional = false;
+  std::vector<std::string> tags = {};
+};
+
+// Labels a value: a strategy by its name, followed by the options that it sets.
+std::string Label(const ConfigNode& value) {
+  const ConfigNode* type = value.IsMap() ? value.Find("type") : nullptr;
+  if (!type) {
+    return value.IsScalar() ? value.text : ToFlowYaml(value);
+  }
+  std::string label = type->text;
+  for (const ConfigNode::Entry& entry : value.entries) {
+    if (entry.key != "type") {
+      label += fmt::format(" {}={}", entry.key, Label(entry.value));
+    }
+  }
+  return label;
+}
+
+// The faults of all trials. Many trials share a fault, so each line is kept once.
+class TrialFaults {
+ public:
+  void Add(const std::string& line) {
+    if (std::ranges::find(lines_, line) == lines_.end()) {
+      lines_.push_back(line);
+    }
+  }
+
+  void Add(const ConfigErrors& errors) {
+    try {
+      errors.ThrowIfAny();
+    } catch (const ConfigError& error) {
+      std::istringstream lines(error.what());
+      for (std::string line; std::getline(lines, line);) {
+        Add(line);
+      }
+    }
+  }
+
+  // Throws ConfigError with one line per fault.
+  void ThrowIfAny() const {
+    if (!lines_.empty()) {
+      throw ConfigError(fmt::format("{}", fmt::join(lines_, "\n")));
+    }
+  }
+
+ private:
+  std::vector<std::string> lines_;
+};
+
+// Makes a trial without an id. `axes` are the option paths that the rows of the study set.
+StudyTrial MakeTrial(const SubjectTree& subject, const StudyRow& row,
+                     const std::vector<std::string>& axes, const ConfigNode& defaults,
+                     TrialFaults& faults) {
+  ConfigErrors errors;
+  ConfigNode tree = subject.tree;
+  StudyTrial trial{"", subject.name, std::vector<std::string>(axes.size()), {}, subject.tags};
+  for (const OptionSetting& setting : row) {
+    ApplySetting(setting, defaults, tree, errors);
+    const auto axis = std::find(axes.begin(), axes.end(), setting.key);
+    trial.values[static_cast<std::size_t>(axis - axes.begin())] = Label(setting.value);
+  }
+  trial.experiment = ReadConfigTree<Experiment>(tree, errors);
+  faults.Add(errors);
+  if (!trial.experiment.alternatives.empty()) {
+    faults.Add(
+        fmt::format("{}: alternatives: only a run has them, and a study varies by its axes; write "
+                    "`alternatives: []` under its `set`",
+                    subject.name));
+  }
+  return trial;
+}
+
+// Hashes resolved experiments. Each input file enters with its content instead of its path, so that
+// the hash is the same on every machine.
+class ExperimentHash {
+ public:
+  std::string operator()(const Experiment& experiment) {
+    std::string text = WriteConfig(experiment);
+    for (const fs::path& file : InputFilesOf(experiment)) {
+      const std::string name = file.string(), hash = "sha256:" + HashFile(file);
+      for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at)) {
+        text.replace(at, name.size(), hash);
+      }
+    }
+    return Shorten(text);
+  }
+
+  static std::string Shorten(const std::string& text) {
+    constexpr std::size_t kDigits = 12;  // 48 bits: 100,000 trials collide with a chance of 2e-5
+    return Sha256OfText(text).substr(0, kDigits);
+  }
+
+ private:
+  // The hash of a folder (a DICOM series) is the hash of the hashes of its files.
+  std::string HashFile(const fs::path& file) {
+    if (!fs::is_directory(file)) {
+      return files_.Of(file);
+    }
+    std::string all;
+    for (const fs::path& part : VolumeFiles(file)) {
+      all += files_.Of(part);
+    }
+    return Sha256OfText(all);
+  }
+
+  FileHashes files_;
+};
+
+// Reads the trees of the experiments that a study file names, and edits them as it says. Adds
+// faults to `errors`.
 class SubjectReader {
  public:
   SubjectReader(const StudyFile& study, const ConfigNode& tree, const ConfigNode& defaults,
@@ -30,23 +145,19 @@ class SubjectReader {
       : study_(study), tree_(tree), defaults_(defaults), errors_(errors) {}
 
   struct All {
-    std::vector<SubjectTree> subjects, others, held_out;
+    std::vector<SubjectTree> subjects, others;
   };
 
   All Read() const {
     const ConfigNode base = ReadBase();
-    All all{.subjects = ReadList(study_.subjects, "subjects", base), .others = {}, .held_out = {}};
+    All all{.subjects = ReadList(study_.subjects, "subjects", base), .others = {}};
     if (study_.subjects.empty()) {
       all.subjects.push_back({"base", base});
       Apply(study_.set, all.subjects.back().tree);
     }
     if (study_.identify) {
       all.others = ReadList(study_.identify->others, "identify.others", base);
-      RequireOtherNames(all.subjects, all.others, "identify.others");
-    }
-    if (study_.search) {
-      all.held_out = ReadList(study_.search->held_out, "search.held_out", base);
-      RequireOtherNames(all.subjects, all.held_out, "search.held_out");
+      RequireOtherNames(all.subjects, all.others);
     }
     return all;
   }
@@ -70,11 +181,10 @@ class SubjectReader {
   }
 
   void RequireOtherNames(const std::vector<SubjectTree>& subjects,
-                         const std::vector<SubjectTree>& others,
-                         const std::string& list_path) const {
+                         const std::vector<SubjectTree>& others) const {
     for (std::size_t n = 0; n < others.size(); ++n) {
       if (std::ranges::find(subjects, others[n].name, &SubjectTree::name) != subjects.end()) {
-        Fail(JoinPath(list_path, n),
+        Fail(JoinPath("identify.others", n),
              fmt::format("'{}' is one of the subjects already; take one out", others[n].name));
       }
     }
@@ -121,13 +231,13 @@ class SubjectReader {
   }
 
   const StudyFile& study_;
-  const ConfigNode& tree_;  // of the file, for places
+  const ConfigNode& tree_;  // tree of the study file, for locations
   const ConfigNode& defaults_;
   ConfigErrors& errors_;
 };
 
-// The option paths that the rows set, in the order in which they occur.
-std::vector<std::string> AxesOf(const std::vector<StudyRow>& rows) {
+// Collects the option paths that the rows set, in the order of their first occurrence.
+std::vector<std::string> CollectAxes(const std::vector<StudyRow>& rows) {
   std::vector<std::string> axes;
   for (const StudyRow& row : rows) {
     for (const OptionSetting& setting : row) {
@@ -151,7 +261,8 @@ std::set<std::string> MissingFiles(const std::vector<StudyTrial>& trials) {
   return missing;
 }
 
-// What the results of a study's trials rest on beside their experiments; empty for job: face.
+// Describes everything besides the experiment that the results of a trial depend on. Empty for
+// `job: face`.
 std::string CommonPart(const StudyPlan& plan, ExperimentHash& hash) {
   std::string common = plan.job == StudyJob::kDepth ? "depth" : "";
   if (plan.job == StudyJob::kIdentify) {
@@ -164,15 +275,16 @@ std::string CommonPart(const StudyPlan& plan, ExperimentHash& hash) {
   return common;
 }
 
-// Gives each trial its id; two of one id are a fault.
+// Gives each trial its id. Two trials with one id are a fault.
 void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
   ExperimentHash hash;
-  plan.common = CommonPart(plan, hash);
+  const std::string common = CommonPart(plan, hash);
   std::map<std::string, std::size_t> first;
   std::string ids;
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     StudyTrial& trial = plan.trials[n];
-    trial.id = TrialId(trial.experiment, plan.common, hash);
+    const std::string own = hash(trial.experiment);
+    trial.id = common.empty() ? own : ExperimentHash::Shorten(own + common);
     ids += trial.id;
     const auto [it, is_new] = first.emplace(trial.id, n);
     if (!is_new) {
@@ -181,13 +293,7 @@ void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
           file.string(), it->second + 1, n + 1, trial.subject, fmt::join(trial.values, ", ")));
     }
   }
-  ids += plan.common;
-  if (plan.search) {
-    StudySearch how = plan.search->options;
-    how.held_out.clear();  // their experiments are among the ids
-    ids += WriteConfig(how);
-  }
-  plan.hash = Sha256OfText(ids).substr(0, ExperimentHash::kIdDigits);
+  plan.hash = ExperimentHash::Shorten(ids + common);
 }
 
 void AddTrials(const fs::path& file, const SubjectTree& subject, const std::vector<StudyRow>& rows,
@@ -200,15 +306,15 @@ void AddTrials(const fs::path& file, const SubjectTree& subject, const std::vect
   if (missing.empty()) {
     plan.trials.insert(plan.trials.end(), trials.begin(), trials.end());
   } else if (subject.optional) {
-    plan.notes.push_back(
-        fmt::format("subject {}: skipped, as there is no {}", subject.name, *missing.begin()));
+    plan.notes.push_back(fmt::format("subject {}: skipped, because {} does not exist", subject.name,
+                                     *missing.begin()));
   } else {
     faults.Add(fmt::format("{}: subject {}: no such file: {}", file.string(), subject.name,
                            fmt::join(missing, ", ")));
   }
 }
 
-// The person of a subject's tree, where its files are there.
+// Adds a person to the gallery if all files exist.
 void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& plan,
                   TrialFaults& faults) {
   ConfigErrors errors;
@@ -221,78 +327,27 @@ void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& pl
     faults.Add(fmt::format("{}: gallery: {}: no such file: {}", file.string(), person.name,
                            fmt::join(missing, ", ")));
   } else {
-    plan.notes.push_back(
-        fmt::format("gallery: {}: left out, as there is no {}", person.name, *missing.begin()));
+    plan.notes.push_back(fmt::format("gallery: {}: left out, because {} does not exist",
+                                     person.name, *missing.begin()));
   }
-}
-
-bool SearchHasMetric(const StudyFile& study) {
-  return study.search && !study.search->metric.empty();
-}
-
-std::string MetricOf(const StudyFile& study) {
-  return SearchHasMetric(study) ? study.search->metric : study.metric;
 }
 
 void CheckMetric(const StudyFile& study, const ConfigNode& tree, ConfigErrors& errors) {
-  const char* const path = SearchHasMetric(study) ? "search.metric" : "metric";
-  if (const std::string complaint = ComplaintAboutMetric(MetricOf(study), study.job);
+  if (const std::string complaint = ComplaintAboutMetric(study.metric, study.job);
       !complaint.empty()) {
-    errors.Add(LocationOf(tree, path), path, complaint);
+    errors.Add(LocationOf(tree, "metric"), "metric", complaint);
   }
-  if (SearchHasMetric(study) && tree.Find("metric") && study.metric != study.search->metric) {
-    errors.Add(
-        LocationOf(tree, path), path,
-        fmt::format("the study's metric is '{}'; a study has one: take one out", study.metric));
-  }
-}
-
-// The subjects of which the plan has trials.
-std::vector<SubjectTree> LeftOf(const std::vector<SubjectTree>& subjects, const StudyPlan& plan) {
-  std::vector<SubjectTree> left;
-  std::ranges::copy_if(subjects, std::back_inserter(left), [&](const SubjectTree& subject) {
-    return std::ranges::find(plan.trials, subject.name, &StudyTrial::subject) != plan.trials.end();
-  });
-  return left;
-}
-
-// The base as it stands, on all subjects; and whether what the search can make of it can be read.
-void AddSearch(const fs::path& file, SearchPlan search, const std::vector<SubjectTree>& subjects,
-               const std::vector<SubjectTree>& held_out, StudyPlan& plan, TrialFaults& faults) {
-  const std::vector<StudyRow> base(1);
-  for (const SubjectTree& subject : subjects) {
-    AddTrials(file, subject, base, search.defaults, plan, faults);
-  }
-  const std::size_t first_held_out = plan.trials.size();
-  for (const SubjectTree& subject : held_out) {
-    AddTrials(file, subject, base, search.defaults, plan, faults);
-  }
-  for (std::size_t n = first_held_out; n < plan.trials.size(); ++n) {
-    plan.trials[n].aside = true;
-  }
-  search.subjects = LeftOf(subjects, plan);
-  search.held_out = LeftOf(held_out, plan);
-  if (!search.subjects.empty()) {
-    StudyPlan unused{.axes = plan.axes};
-    AddTrials(file, search.subjects[0], RowsToCheck(search), search.defaults, unused, faults);
-    if (const std::string complaint =
-            ComplaintAboutShortRuns(search, plan.job, plan.trials[0].experiment);
-        !complaint.empty()) {
-      faults.Add(fmt::format("{}: search.method: {}", file.string(), complaint));
-    }
-  }
-  plan.search = std::make_shared<const SearchPlan>(std::move(search));
 }
 
 bool HasSkin(const StudyTrial& trial) {
   const auto* files = std::get_if<FileSubject>(&trial.experiment.subject);
-  return !files || !files->skin.empty();  // a phantom and a CT have theirs
+  return !files || !files->skin.empty();  // a phantom and a CT always have one
 }
 
 bool NoneHasSkin(const StudyPlan& plan) { return std::ranges::none_of(plan.trials, HasSkin); }
 
-// What a condition can ask of a trial.
-NamedValues ValuesOf(const StudyPlan& plan, const StudyTrial& trial) {
+// Collects the named values of a trial for a condition.
+NamedValues CollectValues(const StudyPlan& plan, const StudyTrial& trial) {
   NamedValues values = {{"subject", trial.subject}, {"id", trial.id}};
   for (const std::string& tag : trial.tags) {
     values.emplace("tag", tag);
@@ -314,18 +369,13 @@ void AddGallery(const fs::path& file, std::initializer_list<const std::vector<Su
   }
 }
 
-// Whether someone is left to try on; those held out of a search are not.
-bool NoSubjectIsLeft(const StudyPlan& plan) {
-  return plan.search ? plan.search->subjects.empty() : plan.trials.empty();
-}
-
-// Whether someone is left, with what the metric needs.
+// Checks that a subject is left, and that one has the true skin if the metric needs it.
 void CheckSubjects(const fs::path& file, const ConfigNode& tree, WithoutSubjects without_subjects,
                    StudyPlan& plan, TrialFaults& faults) {
   constexpr const char* kNone = "no subject is left; all are optional and lack files";
-  if (NoSubjectIsLeft(plan) && without_subjects == WithoutSubjects::kNote) {
+  if (plan.trials.empty() && without_subjects == WithoutSubjects::kNote) {
     plan.notes.emplace_back(kNone);
-  } else if (NoSubjectIsLeft(plan)) {
+  } else if (plan.trials.empty()) {
     faults.Add(fmt::format("{}: {}", file.string(), kNone));
   } else if (NeedsTrueSkin(plan.metric) && NoneHasSkin(plan)) {
     faults.Add(fmt::format(
@@ -335,7 +385,7 @@ void CheckSubjects(const fs::path& file, const ConfigNode& tree, WithoutSubjects
   }
 }
 
-// The file as it stands, of a size that can be planned.
+// Reads the study file. Throws ConfigError at once if it makes too many trials to expand.
 StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& errors) {
   StudyFile study = ReadStudyFile(file, tree, errors);
   if (const std::string complaint = ComplaintAboutSize(study); !complaint.empty()) {
@@ -345,10 +395,10 @@ StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& er
   return study;
 }
 
-// Without axes and trials.
-StudyPlan EmptyPlan(const StudyFile& study) {
+// Makes a plan without axes and trials.
+StudyPlan MakeEmptyPlan(const StudyFile& study) {
   StudyPlan plan{
-      .title = study.title, .metric = MetricOf(study), .keep = study.keep, .job = study.job};
+      .title = study.title, .metric = study.metric, .keep = study.keep, .job = study.job};
   plan.tags = study.tags;
   return plan;
 }
@@ -362,28 +412,19 @@ StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects) {
   const ConfigNode defaults = ConfigTreeOf(Experiment{});
   CheckMetric(study, tree, errors);
   TrialFaults faults;
-  ConfigErrors of_bases;
-  const auto [subjects, others, held_out] = SubjectReader(study, tree, defaults, of_bases).Read();
-  const std::vector<StudyRow> rows = StudyRows(study, errors);
-  SearchPlan search;
-  if (study.search) {
-    search = MakeSearchPlan(*study.search, tree, errors);
-    search.defaults = defaults;
-  }
+  ConfigErrors base_errors;
+  const auto [subjects, others] = SubjectReader(study, tree, defaults, base_errors).Read();
+  const std::vector<StudyRow> rows = MakeStudyRows(study, errors);
   faults.Add(errors);
-  faults.Add(of_bases);
-  if (of_bases.size() > 0 || (study.search && errors.size() > 0)) {
-    faults.ThrowIfAny();  // the trials would repeat what is wrong with their base and axes
+  faults.Add(base_errors);
+  if (base_errors.size() > 0) {
+    faults.ThrowIfAny();  // the trials would repeat the faults of their base
   }
 
-  StudyPlan plan = EmptyPlan(study);
-  plan.axes = study.search ? search.axes : AxesOf(rows);
-  if (study.search) {
-    AddSearch(file, std::move(search), subjects, held_out, plan, faults);
-  } else {
-    for (const SubjectTree& subject : subjects) {
-      AddTrials(file, subject, rows, defaults, plan, faults);
-    }
+  StudyPlan plan = MakeEmptyPlan(study);
+  plan.axes = CollectAxes(rows);
+  for (const SubjectTree& subject : subjects) {
+    AddTrials(file, subject, rows, defaults, plan, faults);
   }
   if (study.job == StudyJob::kIdentify) {
     plan.identify = study.identify.value_or(IdentifyOptions{});
@@ -396,7 +437,7 @@ StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects) {
   return plan;
 }
 
-std::vector<bool> TrialsThat(const StudyPlan& plan, const std::string& condition) {
+std::vector<bool> SelectTrials(const StudyPlan& plan, const std::string& condition) {
   if (condition.empty()) {
     return std::vector<bool>(plan.trials.size(), true);
   }
@@ -405,12 +446,12 @@ std::vector<bool> TrialsThat(const StudyPlan& plan, const std::string& condition
   const ValueFilter filter(condition, names);
   std::vector<bool> chosen;
   for (const StudyTrial& trial : plan.trials) {
-    chosen.push_back(filter.Holds(ValuesOf(plan, trial)));
+    chosen.push_back(filter.Holds(CollectValues(plan, trial)));
   }
   if (std::ranges::find(chosen, true) == chosen.end()) {
-    throw InputError(
-        fmt::format("{}: none of the {} trials is so; `semblance study plan` lists their values",
-                    condition, plan.trials.size()));
+    throw InputError(fmt::format(
+        "{}: this holds for none of the {} trials; `semblance study plan` lists their values",
+        condition, plan.trials.size()));
   }
   return chosen;
 }

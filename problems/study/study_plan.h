@@ -1,31 +1,32 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A study (study_file.h) as a plan: the table of its trials. It is expanded and checked as a whole
-// before anything runs; of a search, whatever its axes can make of the base is checked.
+// A study (study_file.h) as a plan: the table of its trials. The whole plan is expanded and checked
+// before any trial runs.
 #pragma once
 
 #include <filesystem>
-#include <memory>
 #include <string>
 #include <vector>
 
-#include "problems/study/search_plan.h"
-#include "problems/study/study_trial.h"
+#include "problems/pipeline/experiment.h"
+#include "problems/study/study_file.h"
 
 namespace semblance {
 
-// A person of the gallery (`job: identify`), as the experiment that has the true skin.
+// One trial: the experiment that a subject and a row of settings make.
+struct StudyTrial {
+  // 12 hex digits of a hash over the resolved experiment with its input files by content, over the
+  // job if it is not `face`, and over the gallery if there is one: the same id on every machine.
+  std::string id;
+  std::string subject;              // name in the study
+  std::vector<std::string> values;  // one per axis, as short text; empty if the row does not set it
+  Experiment experiment;
+  std::vector<std::string> tags = {};  // tags of the subject
+};
+
+// A person of the gallery (`job: identify`), with the experiment that names the true skin.
 struct GalleryEntry {
   std::string name;
   Experiment experiment;
-};
-
-// A treatment that a search asked for.
-struct SearchStep {
-  int generation = 0;
-  double cost = 1;                  // in full runs
-  std::vector<std::string> values;  // one per axis
-  std::vector<std::string> trials;  // ids: one per subject; another step's, or the base's, where it
-                                    // is the same experiment
 };
 
 struct StudyPlan {
@@ -37,33 +38,24 @@ struct StudyPlan {
   std::vector<std::string> axes = {};      // option paths, in the order of the file
   std::vector<StudyTrial> trials = {};     // subject by subject
   std::vector<std::string> notes = {};     // e.g. subjects that were skipped
-  std::string hash = {};                   // of all ids, in order
-  IdentifyOptions identify = {};           // of that job
-  std::vector<GalleryEntry> gallery = {};  // the subjects that are left, then the others
-  std::string common = {};                 // what the ids of all trials hold (TrialId)
-
-  // Of a study that searches. Its `trials` are those of the base as it stands, on all subjects and
-  // on those held out; a run adds the others as it goes (search_run.h), and their steps.
-  std::shared_ptr<const SearchPlan> search = nullptr;
-  std::vector<SearchStep> steps = {};
-  int best_step = -1;         // once the search has ended; -1: none had a value
-  bool search_ended = false;  // its budget is spent
+  std::string hash = {};                   // hash of all ids, in order
+  IdentifyOptions identify = {};           // options of `job: identify`
+  std::vector<GalleryEntry> gallery = {};  // the subjects whose files exist, then the others
 };
 
-// Where all subjects are optional and lack files: a fault, or a note, for who only looks whether
-// the study is right.
+// If all subjects are optional and lack files: a fault, or only a note, for `semblance check`.
 enum class WithoutSubjects { kFault, kNote };
 
-// Throws IoError if the file cannot be read; ConfigError with all faults, each once and at its
-// line: those of the file, of every trial's experiment, a metric that no trial can have, and trials
-// that are the same experiment. Without subjects (kNote) the plan has no trials but those on the
-// subjects held out of a search.
+// Reads and expands a study. Throws IoError if the file cannot be read. Throws ConfigError with all
+// faults, each once and with its line: faults of the file and of every trial's experiment, a metric
+// that no trial can have, and trials that are the same experiment. Without subjects (kNote) the
+// plan has no trials.
 StudyPlan ReadStudy(const std::filesystem::path& file,
                     WithoutSubjects without_subjects = WithoutSubjects::kFault);
 
-// Which of the trials a condition (value_filter.h) holds for; all for an empty one. Its names are
-// `subject`, `tag`, `id` and the axes; values are those of the plan. Throws InputError as
-// ValueFilter does, and if it holds for none.
-std::vector<bool> TrialsThat(const StudyPlan& plan, const std::string& condition);
+// Returns, per trial, whether the condition (value_filter.h) holds; an empty condition always
+// holds. Its names are `subject`, `tag`, `id` and the axes, with the values of the plan. Throws
+// InputError as ValueFilter does, and if the condition holds for no trial.
+std::vector<bool> SelectTrials(const StudyPlan& plan, const std::string& condition);
 
 }  // namespace semblance

@@ -19,16 +19,13 @@ std::string Duration(double seconds) {
                         : fmt::format("{:.1f} h", seconds / 3600);
 }
 
-int AllTrials(const StudyEta& eta) { return eta.trials + eta.later; }
-
-// A stream that takes nothing is no reason for a study to stop.
+// Ignores a stream that cannot be written: it must not stop a study.
 void Put(std::FILE* stream, const std::string& text) { std::fputs(text.c_str(), stream); }
 
 }  // namespace
 
 std::string EtaText(const StudyEta& eta) {
-  std::string text =
-      fmt::format("{} of {}{} trials", eta.finished, eta.later > 0 ? "about " : "", AllTrials(eta));
+  std::string text = fmt::format("{} of {} trials", eta.finished, eta.trials);
   const int here = eta.finished - eta.finished_before;
   if (here == 0 && eta.elapsed_s >= 1) {
     text += fmt::format(", {} so far", Duration(eta.elapsed_s));
@@ -37,15 +34,15 @@ std::string EtaText(const StudyEta& eta) {
     const double each_s = eta.elapsed_s / here;
     text += each_s >= 1 ? fmt::format(", {:.1f} s each", each_s)
                         : fmt::format(", {:.1f} a second", 1 / each_s);
-    if (eta.finished < AllTrials(eta)) {
-      text += fmt::format(", about {} left", Duration(each_s * (AllTrials(eta) - eta.finished)));
+    if (eta.finished < eta.trials) {
+      text += fmt::format(", about {} left", Duration(each_s * (eta.trials - eta.finished)));
     }
   }
   return text + (eta.failed > 0 ? fmt::format("; {} failed", eta.failed) : "");
 }
 
 std::string BarText(const StudyEta& eta, int width) {
-  const int full = AllTrials(eta) > 0 ? width * eta.finished / AllTrials(eta) : width;
+  const int full = eta.trials > 0 ? width * eta.finished / eta.trials : width;
   return fmt::format("[{:#<{}}{:.<{}}]", "", full, "", width - full);
 }
 
@@ -60,7 +57,7 @@ StudyProgress::~StudyProgress() {
 
 void StudyProgress::operator()(const StudyEta& eta, const std::string& trial) {
   constexpr const char* kClearLine = "\r\033[K";
-  const bool is_last = eta.finished == AllTrials(eta);
+  const bool is_last = eta.finished == eta.trials;
   if (is_over_) {
     return;
   }

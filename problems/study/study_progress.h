@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far a study has come, for people who wait for it.
+// The progress of a study on the terminal.
 #pragma once
 
 #include <chrono>
@@ -10,32 +10,30 @@
 
 namespace semblance {
 
-// What is known of a study on its way. elapsed_s counts from when `finished_before` trials were
-// done.
+// The state of a running study. elapsed_s counts from the start of this call, when
+// `finished_before` trials had finished.
 struct StudyEta {
   int trials = 0, finished = 0, finished_before = 0, failed = 0;
   double elapsed_s = 0;
-  int later = 0;  // trials that a search has not asked for yet, about
 };
 
-// "12 of 80 trials, 4.6 s each, about 5 min left; 1 failed", without what is not known yet. Of a
-// search "12 of about 80 trials".
+// Writes "12 of 80 trials, 4.6 s each, about 5 min left; 1 failed", without parts not known yet.
 std::string EtaText(const StudyEta& eta);
 
-// "[######......]", `width` characters between the brackets.
+// Draws "[######......]" with `width` characters between the brackets.
 std::string BarText(const StudyEta& eta, int width);
 
-// Shows how far a study is: on a terminal as a bar that is drawn over, otherwise as a line every
-// `interval`, and at the end. A trial that failed has a line of its own.
+// Shows the progress of a study: on a terminal as a bar that is redrawn, otherwise as a line every
+// `interval` and at the end. Each failed trial gets a line of its own.
 class StudyProgress {
  public:
   explicit StudyProgress(std::FILE* stream,
                          std::chrono::milliseconds interval = std::chrono::seconds(5));
-  ~StudyProgress();  // ends the line of a bar that has not come to its end
+  ~StudyProgress();  // ends the line of an unfinished bar
   StudyProgress(const StudyProgress&) = delete;
   StudyProgress& operator=(const StudyProgress&) = delete;
 
-  // Any time. trial: the one that ended, subject, values and status; said alone where it failed.
+  // Call at any time. `trial` describes the trial that ended; it is shown only if the trial failed.
   void operator()(const StudyEta& eta, const std::string& trial);
 
  private:

@@ -1,4 +1,66 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The queue of a study
+// --------------------
+// A study's folder is the only state that lasts. Every call of RunStudy rebuilds the queue from the
+// plan and from the trials that are on disk, so that a call after `kill -9` needs no recovery.
+// The life of one trial within one call:
+//
+//                for each trial of this shard that --only selects
+//                                    |
+//                                    v
+//                    is trials/<id>/trial.json whole?  (ReadTrialFile)
+//                      | no                      | yes
+//                      |                         v
+//                      |      does --rerun ask for its status, or does it
+//                      |      lack a file that `keep` asks for now?
+//                      |         | yes                   | no
+//                      v         v                       v
+//                    +-------------+               +-----------+
+//                    |   QUEUED    |               |  SKIPPED  |  trial.json gets the axes of this
+//                    +-------------+               +-----------+  plan if they have changed
+//                           |  a thread claims it: next_++
+//                           v
+//                    +-------------+  stop request, kill -9
+//                    |   RUNNING   |-----------------------> the disk is as it was before
+//                    +-------------+
+//                           |  result, faults of the result, or an exception
+//                           v
+//                    +-------------+  kill -9, disk full
+//                    |   WRITING   |-----------------------> trial.json is missing, or still the
+//                    +-------------+                         earlier one; the next call decides
+//                           |  rename of trial.json
+//                           v
+//                 DONE, UNUSABLE or FAILED  (its `status`)
+//
+// Invariants:
+//
+//   (1)  A trial exists if and only if its trial.json parses and holds its id. Other files in its
+//        folder do not make it exist.
+//   (2)  Every file is written under a temporary name and renamed. trial.json is written last. So
+//        a trial that exists has all its files. During a rerun the earlier trial.json stays until
+//        the rename; a merge notices files that differ from it by their hashes.
+//   (3)  Unless `keep` is summary, trial.json and the results before it are synced, so that (2)
+//        holds after a power failure too. With `keep: summary` there are no other results: if
+//        trial.json is lost or empty, (1) makes the trial run again.
+//   (4)  The id of a trial is a hash of its job, its resolved experiment and the content of its
+//        input files. A trial on disk is therefore valid for every plan that contains its id: a
+//        changed study keeps the trials that it still has, and no trial becomes invalid.
+//   (5)  trial.json holds no time, host, folder or number of threads. Its bytes depend only on
+//        the trial, on the axes and `keep` of the plan, and on the versions of the program and
+//        its libraries. Everything else is in timing.json, which trial.json does not list.
+//   (6)  Shard i of n owns the trials k with k % n == i. Shards share no trial, hold no lock, and
+//        never read each other's trials. If two processes nevertheless run the same trial, both
+//        write the same bytes (5) by renames (2), and either order is right.
+//   (7)  Within a process a trial is claimed once, because next_ is atomic and queue_ is constant
+//        while threads run. A trial runs on one thread, so its result does not depend on `jobs`.
+//   (8)  While threads run, mutex_ guards summary_, broken_, ended_ and the calls of on_progress.
+//   (9)  An exception inside a trial is the result of that trial (FAILED, with the reason). A
+//        fault in writing the folder ends the whole queue (broken_), because no other trial could
+//        be written.
+//  (10)  plan.json is written before the first trial runs. It lists the trials for tables and
+//        merges. The queue reads it only to refuse the folder of another study and to count the
+//        trials that are left over.
 #include "problems/study/study_run.h"
 
 #include <fmt/format.h>
@@ -26,7 +88,6 @@
 #include "problems/report/scene_json.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/identify_study.h"
-#include "problems/study/search_run.h"
 #include "problems/study/study_metrics.h"
 #include "problems/study/study_tables.h"
 #include "problems/study/trial_folder.h"
@@ -38,12 +99,13 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// The status of a finished trial; nothing if it is not there or not whole.
-std::optional<std::string> StatusOf(const fs::path& folder, const std::string& id) {
+// Returns the status of a trial on disk, or nothing if trial.json is missing or not whole.
+std::optional<std::string> ReadStatus(const fs::path& folder, const std::string& id) {
   const auto json = ReadTrialFile(folder, id);
   return json ? std::optional(json->value("status", "failed")) : std::nullopt;
 }
 
+// The first members of trial.json.
 Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
   Json json = {{"id", trial.id}, {"subject", trial.subject}, {"axes", Json::object()}};
   for (std::size_t k = 0; k < plan.axes.size(); ++k) {
@@ -52,7 +114,8 @@ Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
   return json;
 }
 
-// What identifies how a trial came about. Inputs by name and content: folders differ by machine.
+// Adds inputs, configuration and versions. Inputs have their name and hash but no folder, because
+// folders differ between machines.
 void AppendProvenance(const StudyTrial& trial, FileHashes& hashes, Json& json) {
   std::string config = WriteConfig(trial.experiment);
   json["inputs"] = Json::array();
@@ -79,30 +142,11 @@ double ThreadCpu_s() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-std::shared_ptr<const DiskCache> CacheOnDisk(const StudyRunOptions& options) {
+std::shared_ptr<const DiskCache> OpenDiskCache(const StudyRunOptions& options) {
   constexpr std::uintmax_t kMegabyte = 1'000'000;
   return options.cache.empty()
              ? nullptr
              : std::make_shared<const DiskCache>(options.cache, kMegabyte * options.cache_limit_mb);
-}
-
-// How many trials a search will still ask for, about: what is left of its budget, at as many trials
-// for a full run as it has taken so far, and the best on the subjects held out.
-int StillToAsk(const StudyPlan& plan) {
-  if (!plan.search || plan.search_ended) {
-    return 0;
-  }
-  double spent = 0, trials = 0;
-  for (const SearchStep& step : plan.steps) {
-    spent += step.cost;
-    trials += static_cast<double>(step.trials.size());
-  }
-  const double subjects = static_cast<double>(plan.search->subjects.size());
-  const double left = std::max(0.0, plan.search->options.budget - spent);
-  const auto aside = std::ranges::count_if(plan.trials, &StudyTrial::aside);
-  const auto held_out = 2 * static_cast<std::ptrdiff_t>(plan.search->held_out.size()) - aside;
-  return static_cast<int>(std::lround(left * (spent > 0 ? trials / spent : subjects))) +
-         static_cast<int>(std::max<std::ptrdiff_t>(0, held_out));
 }
 
 class StudyRunner {
@@ -113,15 +157,14 @@ class StudyRunner {
         folder_(std::move(folder)),
         options_(options),
         context_(context),
-        cache_(4 * options.jobs + 6, CacheOnDisk(options)) {}
+        // A trial uses up to 8 stages, and trials share most of them. A larger capacity takes more
+        // memory; a smaller one makes stages again when trials of several subjects alternate.
+        cache_(4 * options.jobs + 6, OpenDiskCache(options)) {}
 
-  // The trials of this shard from `first` on, those before having been run.
-  void Run(std::size_t first) {
-    const std::vector<bool> chosen = TrialsThat(plan_, options_.only);
-    queue_.clear();
-    next_ = ended_ = 0;
-    later_ = StillToAsk(plan_) / options_.shards;
-    for (std::size_t n = first; n < plan_.trials.size(); ++n) {
+  // Runs the queue of this shard.
+  void Run() {
+    const std::vector<bool> chosen = SelectTrials(plan_, options_.only);
+    for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
       if (static_cast<int>(n % options_.shards) == options_.shard && chosen[n]) {
         Queue(plan_.trials[n]);
       }
@@ -140,7 +183,7 @@ class StudyRunner {
     } catch (const std::system_error&) {
       if (threads.empty()) {
         throw;
-      }  // else the system gives no more of them: those that are there do the work
+      }  // otherwise the threads that did start do all the work
     }
     WatchUntilEnded(threads.size());
     threads.clear();  // joins
@@ -152,35 +195,29 @@ class StudyRunner {
   }
   const StudySummary& summary() const { return summary_; }
 
-  // Nothing more is asked for.
-  void TellTheEnd() {
-    later_ = 0;
-    TellProgress("");
-  }
-
  private:
   void Queue(const StudyTrial& trial) {
     ++summary_.trials;
-    std::optional<Json> there = ReadTrialFile(folder_, trial.id);
-    if (there && !IsAskedAgain(there->value("status", "failed")) && HasWhatIsKept(trial, *there)) {
-      TellAxesOfNow(trial, *there);
+    std::optional<Json> stored = ReadTrialFile(folder_, trial.id);
+    if (stored && !MustRerun(stored->value("status", "failed")) && HasKeptFiles(trial, *stored)) {
+      UpdateAxes(trial, *stored);
       ++summary_.skipped;
     } else {
       queue_.push_back(&trial);
     }
   }
 
-  bool IsAskedAgain(const std::string& status) const {
+  bool MustRerun(const std::string& status) const {
     return options_.rerun == Rerun::kAll ||
            (status == "failed" && options_.rerun != Rerun::kNothing) ||
            (status == "unusable" && options_.rerun == Rerun::kUnusable);
   }
 
-  // Whether the trial's folder has the files that `keep` asks for, which may have asked for less
-  // when it ran.
-  bool HasWhatIsKept(const StudyTrial& trial, const Json& there) const {
+  // Returns true if the trial's folder has the files that `keep` asks for now. `keep` may have
+  // asked for fewer files when the trial ran.
+  bool HasKeptFiles(const StudyTrial& trial, const Json& stored) const {
     const bool is_depth = plan_.job == StudyJob::kDepth;
-    const bool has_none = there.value("status", "failed") == "failed" ||
+    const bool has_none = stored.value("status", "failed") == "failed" ||
                           (plan_.keep == TrialFiles::kView && is_depth &&
                            trial.subject != plan_.trials.front().subject);
     const char* file = plan_.keep == TrialFiles::kRun    ? "result.json"
@@ -189,23 +226,24 @@ class StudyRunner {
     return has_none || fs::exists(TrialFolder(folder_, trial.id) / file);
   }
 
-  // A trial of an earlier plan says the axes of that plan.
-  void TellAxesOfNow(const StudyTrial& trial, Json& there) const {
+  // Replaces the axes of an earlier plan in trial.json by those of this plan.
+  void UpdateAxes(const StudyTrial& trial, Json& stored) const {
     const Json head = TrialHead(plan_, trial);
-    bool is_otherwise = false;
+    bool is_changed = false;
     for (const auto& [key, value] : head.items()) {
-      is_otherwise = is_otherwise || !there.contains(key) || there[key] != value;
-      there[key] = value;
+      is_changed = is_changed || !stored.contains(key) || stored[key] != value;
+      stored[key] = value;
     }
-    if (is_otherwise) {
-      WriteFileAtomically(TrialFolder(folder_, trial.id) / "trial.json", there.dump(1) + "\n");
+    if (is_changed) {
+      WriteFileAtomically(TrialFolder(folder_, trial.id) / "trial.json", stored.dump(1) + "\n");
     }
   }
 
+  // Reports progress each second until all threads have ended.
   void WatchUntilEnded(std::size_t threads) {
     std::unique_lock lock(mutex_);
     while (ended_ < threads) {
-      TellProgress("");
+      ReportProgress("");
       thread_ended_.wait_for(lock, std::chrono::seconds(1), [&] { return ended_ == threads; });
     }
   }
@@ -220,7 +258,7 @@ class StudyRunner {
         RunTrial(*queue_[n]);
       } catch (const Cancelled&) {
         return;
-      } catch (...) {  // the folder cannot be written: no trial can
+      } catch (...) {  // invariant 9
         const std::lock_guard lock(mutex_);
         broken_ = std::current_exception();
         broken_flag_ = true;
@@ -228,7 +266,7 @@ class StudyRunner {
     }
   }
 
-  // What a trial leaves beside trial.json.
+  // Writes the files of a trial other than trial.json.
   using Files = std::function<void(OutputFolder&)>;
 
   void RunTrial(const StudyTrial& trial) {
@@ -236,14 +274,16 @@ class StudyRunner {
     Files write = [](OutputFolder&) {};
     const double cpu_before_s = ThreadCpu_s();
     try {
-      write = plan_.job == StudyJob::kFace    ? Face(trial, cpu_before_s, json)
-              : plan_.job == StudyJob::kDepth ? Depth(trial, cpu_before_s, json)
-                                              : Identity(trial, cpu_before_s, json);
+      write = plan_.job == StudyJob::kFace    ? RunFace(trial, cpu_before_s, json)
+              : plan_.job == StudyJob::kDepth ? RunDepth(trial, cpu_before_s, json)
+                                              : RunIdentify(trial, cpu_before_s, json);
     } catch (const Cancelled&) {
       throw;
     } catch (const std::bad_alloc&) {
-      Fail("not enough memory for this trial; run fewer at a time (--jobs), or ask it for less",
-           json);
+      Fail(
+          "not enough memory for this trial; run fewer trials at a time (--jobs), or lower its "
+          "resolution",
+          json);
     } catch (const std::exception& error) {
       Fail(error.what(), json);
     }
@@ -251,15 +291,14 @@ class StudyRunner {
     OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
     write(output);
     std::vector<std::string> names = output.Written();
-    std::erase(names, "timing.json");  // differs from run to run
+    std::erase(names, "timing.json");  // invariant 5
     if (!names.empty()) {
-      json["files"] = HashesOf(output.Root(), names);
+      json["files"] = ListHashes(output.Root(), names);
     }
-    // Last: it says that the trial is whole. A broken one counts as none; with other files beside
-    // it, it must not outlast them.
+    // Invariants 2 and 3.
     output.Write("trial.json", json.dump(1) + "\n",
                  plan_.keep == TrialFiles::kSummary ? Durability::kUnsynced : Durability::kSynced);
-    Tell(trial, json);
+    CountTrial(trial, json);
   }
 
   static void SetStatus(const std::vector<std::string>& faults, Json& json) {
@@ -281,30 +320,31 @@ class StudyRunner {
     return quiet;
   }
 
-  // A bust is for those who open a run's folder; nothing is measured on it.
-  Experiment AsLookedAt(Experiment experiment) const {
+  // Drops the bust unless the files of a run are kept: no number is measured on it.
+  Experiment WithoutUnusedBust(Experiment experiment) const {
     if (plan_.keep != TrialFiles::kRun) {
       experiment.bust = NoBust{};
     }
     return experiment;
   }
 
-  Files Face(const StudyTrial& trial, double cpu_before_s, Json& json) {
+  Files RunFace(const StudyTrial& trial, double cpu_before_s, Json& json) {
     auto result = std::make_shared<const RunResult>(
-        semblance::Run(AsLookedAt(trial.experiment), Quiet(), &cache_));
+        semblance::Run(WithoutUnusedBust(trial.experiment), Quiet(), &cache_));
     SetStatus(result->Faults(), json);
     json["result"] = ResultJson(trial.experiment, *result);
     return FilesOfRun(trial, result, ThreadCpu_s() - cpu_before_s);
   }
 
-  Files Identity(const StudyTrial& trial, double cpu_before_s, Json& json) {
+  Files RunIdentify(const StudyTrial& trial, double cpu_before_s, Json& json) {
     const auto own = std::ranges::find(plan_.gallery, trial.subject, &GalleryEntry::name);
     if (own == plan_.gallery.end()) {
-      throw InputError(fmt::format(
-          "{} is not in the gallery, as files of the study's base are missing", trial.subject));
+      throw InputError(
+          fmt::format("{} is not in the gallery, because files of the study's base are missing",
+                      trial.subject));
     }
     auto result = std::make_shared<const IdentifyResult>(Identify(
-        AsLookedAt(trial.experiment), plan_.gallery,
+        WithoutUnusedBust(trial.experiment), plan_.gallery,
         static_cast<std::size_t>(own - plan_.gallery.begin()), plan_.identify, Quiet(), cache_));
     SetStatus(result->run.Faults(), json);
     json["result"] = IdentifyResultJson(trial.experiment, *result);
@@ -325,7 +365,7 @@ class StudyRunner {
     };
   }
 
-  Files Depth(const StudyTrial& trial, double cpu_before_s, Json& json) {
+  Files RunDepth(const StudyTrial& trial, double cpu_before_s, Json& json) {
     auto result =
         std::make_shared<const DepthResult>(MeasureDepth(trial.experiment, Quiet(), &cache_));
     SetStatus(result->Faults(), json);
@@ -342,25 +382,24 @@ class StudyRunner {
     };
   }
 
-  void Tell(const StudyTrial& trial, const Json& json) {
+  void CountTrial(const StudyTrial& trial, const Json& json) {
     const std::lock_guard lock(mutex_);
     ++(json["status"] == "failed" ? summary_.failed : summary_.done);
     const std::string reason =
         json.contains("reason") ? ": " + json["reason"].get<std::string>() : "";
-    TellProgress(fmt::format("{}: {} {}{}", json["status"].get<std::string>(), trial.subject,
-                             fmt::join(trial.values, " "), reason));
+    ReportProgress(fmt::format("{}: {} {}{}", json["status"].get<std::string>(), trial.subject,
+                               fmt::join(trial.values, " "), reason));
   }
 
-  // With mutex_ held.
-  void TellProgress(const std::string& trial) {
+  // The caller holds mutex_.
+  void ReportProgress(const std::string& trial) {
     if (options_.on_progress) {
       const double elapsed_s = std::chrono::duration<double>(Clock::now() - start_).count();
       options_.on_progress({.trials = summary_.trials,
                             .finished = summary_.done + summary_.failed + summary_.skipped,
                             .finished_before = summary_.skipped,
                             .failed = summary_.failed,
-                            .elapsed_s = elapsed_s,
-                            .later = later_},
+                            .elapsed_s = elapsed_s},
                            trial);
     }
   }
@@ -378,33 +417,11 @@ class StudyRunner {
   std::atomic<bool> broken_flag_ = false;
   std::mutex mutex_;
   std::condition_variable thread_ended_;
-  std::size_t ended_ = 0;  // of the threads
-  int later_ = 0;          // trials that this shard will still be asked for, about
+  std::size_t ended_ = 0;  // number of threads that have ended
   std::exception_ptr broken_;
   StudySummary summary_;
 };
 
-// A search as plan.json has it: how it goes, and what it has asked for so far.
-Json SearchJson(const StudyPlan& plan) {
-  const StudySearch& search = plan.search->options;
-  const Better better = search.better.value_or(BetterOf(plan.metric));
-  Json json = {{"method", ToFlowYaml(ConfigTreeOf(search.method))},
-               {"budget", search.budget},
-               {"random_seed", search.random_seed},
-               {"better", EnumNames(better)[static_cast<std::size_t>(better)]},
-               {"ended", plan.search_ended},
-               {"best", plan.best_step},
-               {"steps", Json::array()}};
-  for (const SearchStep& step : plan.steps) {
-    json["steps"].push_back({{"generation", step.generation},
-                             {"cost", step.cost},
-                             {"values", step.values},
-                             {"trials", step.trials}});
-  }
-  return json;
-}
-
-// plan.json as text.
 std::string PlanJson(const StudyPlan& plan) {
   Json json = {{"title", plan.title}, {"hash", plan.hash},       {"metric", plan.metric},
                {"axes", plan.axes},   {"trials", Json::array()}, {"notes", plan.notes},
@@ -412,114 +429,77 @@ std::string PlanJson(const StudyPlan& plan) {
   for (const StudyTrial& trial : plan.trials) {
     json["trials"].push_back(
         {{"id", trial.id}, {"subject", trial.subject}, {"values", trial.values}});
-    if (trial.aside) {
-      json["trials"].back()["aside"] = true;
-    }
-  }
-  if (plan.search) {
-    json["search"] = SearchJson(plan);
   }
   return json.dump(1) + "\n";
 }
 
-// The trials of an earlier plan that are none of this one.
-int CountLeftOver(const PlanThere& there, const StudyPlan& plan) {
+// Counts the trials of the stored plan that are not in this plan.
+int CountLeftOver(const StoredPlan& stored, const StudyPlan& plan) {
   std::set<std::string> ids;
   for (const StudyTrial& trial : plan.trials) {
     ids.insert(trial.id);
   }
   return static_cast<int>(
-      std::ranges::count_if(there.ids, [&](const std::string& id) { return !ids.contains(id); }));
+      std::ranges::count_if(stored.ids, [&](const std::string& id) { return !ids.contains(id); }));
 }
 
-// Whether the folder was begun with another plan. Throws IoError if that has no trial of this one.
-bool IsChanged(const PlanThere& there, const StudyPlan& plan, const fs::path& folder) {
-  const bool changed = !there.hash.empty() && there.hash != plan.hash;
-  if (changed && CountLeftOver(there, plan) == static_cast<int>(there.ids.size())) {
-    throw IoError(
-        fmt::format("{}: the folder holds another study (plan {}, this is {}), of which no trial "
-                    "is one of this; choose another --out",
-                    folder.string(), there.hash, plan.hash));
+// Returns true if the folder holds another plan. Throws IoError if the two plans share no trial.
+bool IsChanged(const StoredPlan& stored, const StudyPlan& plan, const fs::path& folder) {
+  const bool changed = !stored.hash.empty() && stored.hash != plan.hash;
+  if (changed && CountLeftOver(stored, plan) == static_cast<int>(stored.ids.size())) {
+    throw IoError(fmt::format(
+        "{}: the folder holds another study (plan {}, this is {}), and the two share no "
+        "trial; choose another --out",
+        folder.string(), stored.hash, plan.hash));
   }
   return changed;
 }
 
-bool IsAnyMissing(const StudyPlan& plan, std::size_t first, const fs::path& folder) {
-  return std::any_of(plan.trials.begin() + static_cast<std::ptrdiff_t>(first), plan.trials.end(),
-                     [&](const StudyTrial& trial) { return !StatusOf(folder, trial.id); });
-}
-
-// All that can be wrong with the plans, before anything is written.
-void RequirePlanOf(const fs::path& folder, const std::vector<fs::path>& others) {
-  std::string hash = PlanHashOf(folder);
+// Checks the plans of all folders before anything is written.
+void RequireSamePlan(const fs::path& folder, const std::vector<fs::path>& others) {
+  std::string hash = ReadPlanHash(folder);
   for (const fs::path& other : others) {
-    const std::string own = PlanHashOf(other);
+    const std::string own = ReadPlanHash(other);
     if (own.empty() || (!hash.empty() && own != hash)) {
-      throw IoError(fmt::format("{}: no folder of this study (its plan.json is missing or another)",
-                                other.string()));
+      throw IoError(
+          fmt::format("{}: not a folder of this study (its plan.json is missing or different)",
+                      other.string()));
     }
     ReadStudyResults(other);
     hash = own;
   }
 }
 
-// Of two shards of a search, one may have come further.
-bool HasMoreTrials(const fs::path& folder, const fs::path& other) {
-  return ReadPlanThere(folder).ids.size() > ReadPlanThere(other).ids.size();
-}
-
 }  // namespace
 
 StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
                       const RunContext& context) {
-  if (plan.search && !options.only.empty()) {
-    throw InputError(fmt::format(
-        "--only {}: a search decides itself which trials are run; take it out", options.only));
-  }
-  TrialsThat(plan, options.only);  // what is wrong with it is said before anything is written,
-  CacheOnDisk(options);            // and so is what is wrong with the cache
+  SelectTrials(plan, options.only);  // both throw before anything is written
+  OpenDiskCache(options);
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
-  const PlanThere there = ReadPlanThere(folder);
-  const bool changed = IsChanged(there, plan, folder);
-  StudyPlan grown = plan;
-  StudyRunner runner(grown, folder, options, context);
-  bool ended = true;
-  if (plan.search) {
-    ended = RunSearch(grown, folder, [&](std::size_t first) {
-      if (IsAnyMissing(grown, first, folder)) {
-        output.Write("plan.json", PlanJson(grown));
-      }
-      runner.Run(first);
-    });
-    if (ended) {
-      runner.TellTheEnd();
-    }
-  }
-  output.Write("plan.json", PlanJson(grown));
-  if (!plan.search) {
-    runner.Run(0);
-  }
+  const StoredPlan stored = ReadStoredPlan(folder);
+  const bool changed = IsChanged(stored, plan, folder);
+  StudyRunner runner(plan, folder, options, context);
+  output.Write("plan.json", PlanJson(plan));
+  runner.Run();
   StudySummary summary = runner.summary();
-  summary.waits = !ended;
   summary.changed = changed;
-  summary.left_over = CountLeftOver(there, grown);
+  summary.left_over = CountLeftOver(stored, plan);
   return summary;
 }
 
 std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {
-  RequirePlanOf(folder, others);
+  RequireSamePlan(folder, others);
   std::vector<std::string> not_taken;
   for (const fs::path& other : others) {
     OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
-    if (!HasMoreTrials(folder, other)) {
-      output.Write("plan.json", ReadFileBytes(other / "plan.json"));
-    }
+    output.Write("plan.json", ReadFileBytes(other / "plan.json"));
     if (!fs::exists(other / "trials")) {
       continue;
     }
     for (const auto& entry : fs::directory_iterator(other / "trials")) {
       const std::string id = entry.path().filename().string();
-      if (StatusOf(other, id) && !StatusOf(folder, id)) {
+      if (ReadStatus(other, id) && !ReadStatus(folder, id)) {
         if (const std::string fault = CopyTrial(other, folder, id); !fault.empty()) {
           not_taken.push_back(fmt::format("{}: not taken: {}", entry.path().string(), fault));
         }

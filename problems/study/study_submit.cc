@@ -24,8 +24,8 @@ std::string SubmitScript(const SubmitOptions& o) {
   for (const std::string& option : o.sbatch) {
     extra += fmt::format(" {}", QuotedForShell(option));
   }
-  // The number of shards is fixed here: Slurm's own count is smaller when only some elements of the
-  // array are run again.
+  // Fixes the number of shards, because Slurm's own count is smaller if only some elements of the
+  // array run again.
   const std::string shard = fmt::format(
       "{} study {} --out {} --jobs {} --quiet --shard \"$SLURM_ARRAY_TASK_ID/{}\"",
       QuotedPath(o.program), QuotedPath(o.study), QuotedPath(o.folder), o.jobs, o.shards);
@@ -33,8 +33,7 @@ std::string SubmitScript(const SubmitOptions& o) {
   const std::string log = fs::absolute(o.folder).string();
   return fmt::format(
       "#!/bin/sh\n"
-      "# Submits the study and its merge to Slurm. Run again, it submits again: what is done is "
-      "skipped.\n"
+      "# Submits the study and its merge to Slurm. It may run again: finished trials are skipped.\n"
       "set -eu\n"
       "array=$(sbatch --parsable --requeue --job-name={} --array=0-{} --cpus-per-task={} "
       "--output={}{} \\\n  --wrap={})\n"
@@ -52,12 +51,12 @@ fs::path SubmitStudy(const SubmitOptions& options) {
   const fs::path script = folder.Root() / "submit.sh";
   if (std::system("command -v sbatch > /dev/null 2>&1") != 0) {
     throw InputError(fmt::format(
-        "--slurm: there is no sbatch here; {} is written: run it with sh where Slurm is",
+        "--slurm: this machine has no sbatch; run {} with sh on a machine that has Slurm",
         script.string()));
   }
   if (std::system(("sh " + QuotedPath(script)).c_str()) != 0) {
     throw InputError(fmt::format(
-        "{}: sbatch refused, see above; mend the options after --sbatch and submit again",
+        "{}: sbatch failed, see above; correct the options after --sbatch and submit again",
         script.string()));
   }
   return script;

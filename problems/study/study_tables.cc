@@ -14,7 +14,6 @@
 #include <utility>
 
 #include "problems/study/trial_folder.h"
-#include "problems/study/trial_numbers.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
@@ -27,7 +26,7 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-// What is drawn as a curve, where it is there.
+// Moves the lists that reports draw as curves.
 void TakeCurves(std::map<std::string, std::vector<double>>& lists, TrialRow& row) {
   row.quantiles_mm = std::move(lists["face.quantiles_mm"]);
   row.depth_coverage = std::move(lists["depth_truth.along_direction.coverage"]);
@@ -41,8 +40,8 @@ void TakeCurves(std::map<std::string, std::vector<double>>& lists, TrialRow& row
   }
 }
 
-// NaN where the file is not there or says nothing of it.
-double WallSeconds(const fs::path& file) {
+// Returns NaN if the file is missing or lacks the time.
+double ReadWallTime_s(const fs::path& file) {
   std::error_code ignored;
   if (!fs::exists(file, ignored)) {
     return kNaN;
@@ -53,8 +52,8 @@ double WallSeconds(const fs::path& file) {
              : kNaN;
 }
 
-// Nothing where the file is not there or is no whole trial.json.
-std::optional<TrialNumbers> NumbersIn(const fs::path& file) {
+// Returns nothing if the file is missing or is not a whole trial.json.
+std::optional<TrialNumbers> ReadNumbers(const fs::path& file) {
   std::error_code ignored;
   try {
     return fs::exists(file, ignored) ? ReadTrialNumbers(ReadFileBytes(file)) : std::nullopt;
@@ -65,20 +64,21 @@ std::optional<TrialNumbers> NumbersIn(const fs::path& file) {
 
 void ReadTrial(const fs::path& folder, TrialRow& row) {
   row.status = "missing";
-  std::optional<TrialNumbers> trial = NumbersIn(TrialFolder(folder, row.id) / "trial.json");
+  std::optional<TrialNumbers> trial = ReadNumbers(TrialFolder(folder, row.id) / "trial.json");
   if (!trial || trial->id != row.id) {
     return;
   }
   row.status = std::move(trial->status);
   row.reason = std::move(trial->reason);
-  row.wall_s = WallSeconds(TrialFolder(folder, row.id) / "timing.json");
+  row.wall_s = ReadWallTime_s(TrialFolder(folder, row.id) / "timing.json");
   row.metrics = std::move(trial->metrics);
   TakeCurves(trial->lists, row);
 }
 
-// All of them, side by side: a study's trials are many, and reading them is most of its tables.
+// Reads all trials in parallel: a study has many, and reading them takes most of the time of its
+// tables.
 void ReadTrials(const fs::path& folder, std::vector<TrialRow>& rows) {
-  constexpr std::size_t kBlock = 4;
+  constexpr std::size_t kBlock = 4;  // trials per task
   ParallelFor(rows.size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())),
               kBlock, [&](std::size_t n) { ReadTrial(folder, rows[n]); });
 }
@@ -95,8 +95,8 @@ std::map<std::string, double> BySubject(const StudyResults& results, const Treat
   return values;
 }
 
-// The names of all metrics that a trial has, sorted.
-std::set<std::string> MetricsOf(const StudyResults& results) {
+// Collects the names of all metrics of all trials, sorted.
+std::set<std::string> CollectMetrics(const StudyResults& results) {
   const auto name = [](const auto& metric) -> const std::string& { return metric.first; };
   std::set<std::string> metrics;
   for (const TrialRow& row : results.trials) {
@@ -107,9 +107,10 @@ std::set<std::string> MetricsOf(const StudyResults& results) {
   return metrics;
 }
 
-// The area that the study's metric is taken over: the closest `area_cm2` above it.
-std::string AreaMetricOf(const StudyResults& results) {
-  const std::set<std::string> known = MetricsOf(results);
+// Finds the area that the study's metric is taken over: the closest `area_cm2` above it in the
+// path.
+std::string FindAreaMetric(const StudyResults& results) {
+  const std::set<std::string> known = CollectMetrics(results);
   std::string group = results.metric;
   while (group.find('.') != group.npos) {
     group = group.substr(0, group.rfind('.'));
@@ -120,22 +121,12 @@ std::string AreaMetricOf(const StudyResults& results) {
   return "";
 }
 
-// What a search was told; none where the metric says it itself.
-std::optional<Better> SaidBetter(const Json& plan) {
-  if (!plan.contains("search")) {
-    return std::nullopt;
-  }
-  const std::string said = plan["search"].at("better");
-  return said == "higher" ? Better::kHigher : said == "nearest" ? Better::kNearest : Better::kLower;
-}
-
-// Of the plan; its figures are read later.
-TrialRow RowOf(const Json& trial) {
+// Makes a row from the plan. Its numbers are read later.
+TrialRow MakeRow(const Json& trial) {
   TrialRow row;
   row.id = trial.at("id");
   row.subject = trial.at("subject");
   row.values = trial.at("values").get<std::vector<std::string>>();
-  row.aside = trial.value("aside", false);
   return row;
 }
 
@@ -156,8 +147,7 @@ StudyResults ReadStudyResults(const fs::path& folder) {
   const fs::path file = folder / "plan.json";
   const auto fail = [&file] {
     return IoError(fmt::format(
-        "{}: not the plan of a study, or of a part of it only; run the study again, which writes "
-        "it anew",
+        "{}: not the plan of a study, or cut short; run the study again to write it again",
         file.string()));
   };
   StudyResults results;
@@ -169,14 +159,14 @@ StudyResults ReadStudyResults(const fs::path& folder) {
     results.axes = plan.at("axes").get<std::vector<std::string>>();
     results.notes = plan.at("notes").get<std::vector<std::string>>();
     for (const Json& trial : plan.at("trials")) {
-      results.trials.push_back(RowOf(trial));
+      results.trials.push_back(MakeRow(trial));
       if (results.trials.back().values.size() != results.axes.size()) {
         throw fail();
       }
     }
     ReadTrials(folder, results.trials);
     results.tags = plan.value("tags", std::vector<std::string>());
-    results.preference = PreferenceFor(results.metric, SaidBetter(plan));
+    results.preference = PreferenceFor(results.metric);
   } catch (const nlohmann::json::exception&) {
     throw fail();
   }
@@ -188,8 +178,8 @@ StudyResults ReadStudyResults(const fs::path& folder) {
 }
 
 std::vector<std::string> AreaNotes(const StudyResults& results) {
-  constexpr double kAlike = 0.005;
-  const std::string metric = AreaMetricOf(results);
+  constexpr double kTolerance = 0.005;  // relative; a smaller one warns of smaller differences
+  const std::string metric = FindAreaMetric(results);
   std::map<std::string, std::pair<double, double>> range_cm2;  // by subject: least and most
   for (const TrialRow& row : results.trials) {
     const auto area = row.metrics.find(metric);
@@ -200,20 +190,19 @@ std::vector<std::string> AreaNotes(const StudyResults& results) {
       most = std::max(most, area->second);
     }
   }
-  std::vector<std::string> unlike;
+  std::vector<std::string> changed;
   for (const auto& [subject, range] : range_cm2) {
-    if (range.second - range.first > kAlike * range.second) {
-      unlike.push_back(fmt::format("{} ({:.1f} to {:.1f})", subject, range.first, range.second));
+    if (range.second - range.first > kTolerance * range.second) {
+      changed.push_back(fmt::format("{} ({:.1f} to {:.1f})", subject, range.first, range.second));
     }
   }
-  if (unlike.empty()) {
+  if (changed.empty()) {
     return {};
   }
   return {fmt::format(
-      "the treatments were not measured on the same area ({}, cm²): of {}. Their figures cannot "
-      "be compared as they stand; let them differ in nothing that decides what is measured "
-      "(region, network)",
-      metric, fmt::join(unlike, ", "))};
+      "the treatments were not measured on the same area ({}, cm²): {}. Their numbers cannot be "
+      "compared; use the same options for what is measured (region, network) in all treatments",
+      metric, fmt::join(changed, ", "))};
 }
 
 std::string TreatmentLabel(const std::vector<std::string>& axes,
@@ -233,9 +222,6 @@ std::vector<Treatment> Treatments(const StudyResults& results, const std::string
   std::map<std::vector<std::string>, std::size_t> index;
   for (std::size_t n = 0; n < results.trials.size(); ++n) {
     const TrialRow& row = results.trials[n];
-    if (row.aside) {
-      continue;
-    }
     const auto [it, is_new] = index.try_emplace(row.values, treatments.size());
     if (is_new) {
       treatments.push_back({row.values, TreatmentLabel(results.axes, row.values), {}, {}});
@@ -268,8 +254,8 @@ std::string TrialsCsv(const StudyResults& results) {
 
 namespace {
 
-// The trials' values of one metric after the other, in the order of the names: each trial's are
-// passed over once, for to look each of them up takes longer than all else of a table.
+// Walks through the metrics in the order of their names, for all trials at once. One pass is much
+// faster than to look up each value of a trial.
 class MetricWalk {
  public:
   explicit MetricWalk(const StudyResults& results) : results_(results) {
@@ -278,7 +264,7 @@ class MetricWalk {
     }
   }
 
-  // As BySubject. metric: behind those that were asked for of these trials before.
+  // Does what BySubject does. Metrics must be requested in ascending order for each trial.
   std::map<std::string, double> Next(const Treatment& treatment, const std::string& metric) {
     std::map<std::string, double> values;
     for (const std::size_t n : treatment.trials) {
@@ -305,7 +291,7 @@ std::string SummaryCsv(const StudyResults& results) {
   CsvWriter csv(columns);
   const std::vector<Treatment> treatments = Treatments(results, results.metric);
   MetricWalk walk(results);
-  for (const std::string& metric : MetricsOf(results)) {
+  for (const std::string& metric : CollectMetrics(results)) {
     for (const Treatment& treatment : treatments) {
       std::vector<double> values;
       for (const auto& [subject, value] : walk.Next(treatment, metric)) {

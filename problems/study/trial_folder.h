@@ -1,43 +1,58 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a study has on disk: plan.json, and a folder per trial, which is whole once its trial.json
-// is.
+// A study on disk: plan.json, and one folder per trial. A trial is whole if its trial.json is.
 #pragma once
 
 #include <filesystem>
+#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace semblance {
 
 std::filesystem::path TrialFolder(const std::filesystem::path& study, const std::string& id);
 
-// trial.json of a trial that is whole; nothing if it is not there, cut short, of another trial, or
-// if its status or reason are no texts.
+// Reads the trial.json of a whole trial. Returns nothing if it is missing, cut short, or of another
+// trial, or if its status or reason is not a text.
 std::optional<nlohmann::ordered_json> ReadTrialFile(const std::filesystem::path& study,
                                                     const std::string& id);
 
-// What a study's plan.json says.
-struct PlanThere {
-  std::string hash;              // empty: there is no plan
-  std::vector<std::string> ids;  // of its trials
+// The content of a study's plan.json that a later call needs.
+struct StoredPlan {
+  std::string hash;              // empty if there is no plan.json
+  std::vector<std::string> ids;  // ids of its trials
 };
-// Throws IoError if the file is there and not the plan of a study.
-PlanThere ReadPlanThere(const std::filesystem::path& study);
+// Throws IoError if plan.json exists and is not the plan of a study.
+StoredPlan ReadStoredPlan(const std::filesystem::path& study);
 
-// The hash alone.
-std::string PlanHashOf(const std::filesystem::path& study);
+// Reads the hash alone.
+std::string ReadPlanHash(const std::filesystem::path& study);
 
-// One entry {file, sha256} per name, for trial.json.
-nlohmann::ordered_json HashesOf(const std::filesystem::path& trial,
-                                const std::vector<std::string>& names);
+// Lists one entry {file, sha256} per name, for trial.json.
+nlohmann::ordered_json ListHashes(const std::filesystem::path& trial,
+                                  const std::vector<std::string>& names);
 
-// Copies a trial that is whole to another study's folder: all of it or nothing, trial.json last.
-// Returns why it is not taken: a file that trial.json or manifest.json names is missing or has
-// another hash, or the folder holds links or devices, which may lead out of it. Empty if it was
-// taken. Throws IoError if it cannot be read or written.
+// Copies a whole trial to another study's folder, completely or not at all, trial.json last.
+// Returns "", or the reason why it was not copied: a file that trial.json or manifest.json names is
+// missing or has another hash, or the folder has links or devices, which may lead out of it. Throws
+// IoError if a file cannot be read or written.
 std::string CopyTrial(const std::filesystem::path& from, const std::filesystem::path& to,
                       const std::string& id);
+
+// The parts of a trial.json that the tables of a study need. They are read from the text without a
+// JSON tree, because a study has thousands of trials with hundreds of numbers each.
+struct TrialNumbers {
+  std::string id, status = "failed", reason;
+  std::map<std::string, double> metrics;  // numbers of `result` by dotted path
+  // The numbers in lists of `result`, in their order; a list of objects gives one list per member;
+  // null becomes NaN.
+  std::map<std::string, std::vector<double>> lists;
+};
+
+// Returns nothing if the text is not a JSON object, is nested deeper than kDeepestJson, or has an
+// id, status or reason that is not a text.
+std::optional<TrialNumbers> ReadTrialNumbers(std::string_view text);
 
 }  // namespace semblance

@@ -17,7 +17,6 @@
 #include "problems/study/depth_study.h"
 #include "problems/study/trial_folder.h"
 #include "problems/study_report/results_sqlite.h"
-#include "problems/study_report/search_report.h"
 #include "problems/study_report/study_ranking.h"
 #include "problems/study_report/study_sections.h"
 #include "surfaces/base/parallel.h"
@@ -433,9 +432,6 @@ std::string StudyPage(const StudyResults& results, const std::filesystem::path& 
                                          "box plot of the metric, one row per treatment")};
   }
   report.sections = MetricSections(results, ranked, maps);
-  if (const auto search = ReadSearchResults(root, results)) {
-    report.sections.insert(report.sections.begin(), SearchSection(results, *search));
-  }
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
   report.notes = Notes(results);

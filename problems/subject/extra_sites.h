@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "problems/config/config_errors.h"
 #include "problems/config/config_tree.h"
 #include "problems/subject/average_skull.h"
 #include "surfaces/base/auto_or.h"

@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/config/config.h"
-#include "problems/config/value_json.h"
+#include "problems/config/options_reference.h"
 #include "problems/pipeline/experiment_config.h"
 
 namespace semblance {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <system_error>
 
-#include "problems/config/config_limits.h"
+#include "problems/config/config_tree.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/workbench/bench_assets.h"

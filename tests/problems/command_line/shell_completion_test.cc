@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What shells and `man` are told is what the program declares, and a shell takes it.
+// Completions and the manual page have what the program declares, and real shells accept them.
 #include "problems/command_line/shell_completion.h"
 
 #include <gtest/gtest.h>
 
-#include <CLI/CLI.hpp>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "problems/command_line/command_tree.h"
-#include "problems/command_line/manual_page.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {
@@ -48,50 +44,50 @@ CommandNode Sample() {
                          .commands = {}}}}}};
 }
 
-// What a shell command prints.
-std::string Said(const std::string& command) {
-  std::string said;
+// Runs a shell command and returns its output.
+std::string Output(const std::string& command) {
+  std::string output;
   std::array<char, 256> buffer;
   const std::unique_ptr<FILE, int (*)(FILE*)> pipe(popen(command.c_str(), "r"), &pclose);
   while (std::fgets(buffer.data(), buffer.size(), pipe.get()) != nullptr) {
-    said += buffer.data();
+    output += buffer.data();
   }
-  return said;
+  return output;
 }
 
-// What bash offers after these words, the last of them unfinished; files of an empty folder.
-std::string Offered(const std::string& script, const std::string& words) {
+// Returns what bash offers after `words`, the last of which is unfinished, in an empty folder.
+std::string OfferedByBash(const std::string& script, const std::string& words) {
   testing::ScratchFolder folder;
   std::ofstream(folder.Path() / "script") << script;
-  return Said("cd '" + folder.Path().string() +
-              "' && mkdir empty && cd empty && bash -c 'source ../script; COMP_WORDS=(" + words +
-              "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _tool; echo \"${COMPREPLY[*]}\"'");
+  return Output("cd '" + folder.Path().string() +
+                "' && mkdir empty && cd empty && bash -c 'source ../script; COMP_WORDS=(" + words +
+                "); COMP_CWORD=$((${#COMP_WORDS[@]} - 1)); _tool; echo \"${COMPREPLY[*]}\"'");
 }
 
-TEST(ShellCompletion, BashOffersWhatMayFollow) {
+TEST(ShellCompletion, BashOffersTheNextWords) {
   const std::string script = BashCompletion(Sample());
-  EXPECT_EQ(Offered(script, "tool \"\""), "run marks -h --help\n");
-  EXPECT_EQ(Offered(script, "tool ma"), "marks\n");
-  EXPECT_EQ(Offered(script, "tool marks pro"), "propose\n");
-  EXPECT_EQ(Offered(script, "tool marks convert --"), "--help --out\n");
-  EXPECT_EQ(Offered(script, "tool run file.yaml --o"), "--out\n");
-  EXPECT_EQ(Offered(script, "tool propose --o"), "\n");  // no command of the program itself
-  EXPECT_EQ(Offered(script, "tool run --again \"\""), "failed all\n");
-  EXPECT_EQ(Offered(script, "tool run --out \"\""), "\n");  // files, and there are none
+  EXPECT_EQ(OfferedByBash(script, "tool \"\""), "run marks -h --help\n");
+  EXPECT_EQ(OfferedByBash(script, "tool ma"), "marks\n");
+  EXPECT_EQ(OfferedByBash(script, "tool marks pro"), "propose\n");
+  EXPECT_EQ(OfferedByBash(script, "tool marks convert --"), "--help --out\n");
+  EXPECT_EQ(OfferedByBash(script, "tool run file.yaml --o"), "--out\n");
+  EXPECT_EQ(OfferedByBash(script, "tool propose --o"), "\n");  // `propose` is not a top command
+  EXPECT_EQ(OfferedByBash(script, "tool run --again \"\""), "failed all\n");
+  EXPECT_EQ(OfferedByBash(script, "tool run --out \"\""), "\n");  // files: the folder is empty
 }
 
-// As its own loader reads it, with what zsh gives to a completion in the place of what shows it.
+// Loads the script with zsh's own loader, with stand-ins that print the completions.
 std::string OfferedByZsh(const std::string& script, const std::string& words) {
   testing::ScratchFolder folder;
   std::ofstream(folder.Path() / "_tool") << script;
-  return Said("cd '" + folder.Path().string() +
-              "' && zsh -f -c 'fpath=($PWD $fpath); autoload -U _tool; words=(" + words +
-              "); CURRENT=${#words}; PREFIX=${words[-1]};"
-              "_describe() { print -r -- ${(P)2%%:*} }; _files() { print files };"
-              "compadd() { print -r -- ${(P)2} }; _tool'");
+  return Output("cd '" + folder.Path().string() +
+                "' && zsh -f -c 'fpath=($PWD $fpath); autoload -U _tool; words=(" + words +
+                "); CURRENT=${#words}; PREFIX=${words[-1]};"
+                "_describe() { print -r -- ${(P)2%%:*} }; _files() { print files };"
+                "compadd() { print -r -- ${(P)2} }; _tool'");
 }
 
-TEST(ShellCompletion, ZshOffersWhatMayFollowAtTheFirstTime) {
+TEST(ShellCompletion, ZshOffersTheNextWordsAtTheFirstCall) {
   if (std::system("command -v zsh > /dev/null") != 0) {
     GTEST_SKIP() << "zsh is not installed";
   }
@@ -106,12 +102,12 @@ TEST(ShellCompletion, ZshOffersWhatMayFollowAtTheFirstTime) {
 std::string OfferedByFish(const std::string& script, const std::string& line) {
   testing::ScratchFolder folder;
   std::ofstream(folder.Path() / "script") << script;
-  return Said("cd '" + folder.Path().string() + "' && mkdir empty && cd empty && HOME=" +
-              folder.Path().string() + " fish -N -c 'source ../script; complete -C \"" + line +
-              "\" | cut -f 1 | tr \"\\n\" \" \"'");
+  return Output("cd '" + folder.Path().string() + "' && mkdir empty && cd empty && HOME=" +
+                folder.Path().string() + " fish -N -c 'source ../script; complete -C \"" + line +
+                "\" | cut -f 1 | tr \"\\n\" \" \"'");
 }
 
-TEST(ShellCompletion, FishOffersWhatMayFollow) {
+TEST(ShellCompletion, FishOffersTheNextWords) {
   if (std::system("command -v fish > /dev/null") != 0) {
     GTEST_SKIP() << "fish is not installed";
   }
@@ -124,33 +120,16 @@ TEST(ShellCompletion, FishOffersWhatMayFollow) {
   EXPECT_EQ(OfferedByFish(script, "tool propose --o"), "");
 }
 
-TEST(ShellCompletion, EveryShellKnowsEveryCommandAndOption) {
+TEST(ShellCompletion, EveryScriptHasEveryCommandAndOption) {
   const CommandNode program = Sample();
   for (const std::string& text :
        {BashCompletion(program), ZshCompletion(program), FishCompletion(program)}) {
     for (const char* word : {"run", "marks", "convert", "propose", "out", "help"}) {
       EXPECT_NE(text.find(word), std::string::npos) << word;
     }
-    EXPECT_EQ(text.find("FILE"), std::string::npos);  // a positional is no word to type
+    EXPECT_EQ(text.find("FILE"), std::string::npos);  // a positional is not a word to type
   }
   EXPECT_NE(FishCompletion(program).find("-d 'it'\\''s the user'\\''s folder'"), std::string::npos);
-}
-
-TEST(CommandTree, TellsTheWordsThatAnOptionTakes) {
-  enum class Side { kLeft, kRight };
-  const std::map<std::string, Side> sides = {{"left", Side::kLeft}, {"right", Side::kRight}};
-  CLI::App app("Does things.", "tool");
-  std::string word, file;
-  Side side = Side::kLeft;
-  app.add_option("--word", word, "one of two")->check(CLI::IsMember({"a", "b c"}));
-  app.add_option("--side", side, "of the head")->transform(CLI::CheckedTransformer(sides));
-  app.add_option("--file", file, "any");
-  const CommandNode tool = TreeOf(app);
-  using Words = std::vector<std::string>;
-  ASSERT_EQ(tool.options.size(), 4U);  // the first is --help
-  EXPECT_EQ(tool.options[1].choices, (Words{"a", "b c"}));
-  EXPECT_EQ(tool.options[2].choices, (Words{"left", "right"}));
-  EXPECT_EQ(tool.options[3].choices, Words{});
 }
 
 TEST(ManualPage, HasEachCommandWithItsOptions) {

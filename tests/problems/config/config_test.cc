@@ -1,18 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reading strictly: what is accepted, and the exact words for all that is not.
+// The strict reader and its exact messages; bases, overrides, resolved text, reference and schema.
 #include "problems/config/config.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <bit>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
 
 #include "problems/config/spelling_suggestion.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/config_samples.h"
 #include "tests/testing/scratch_folder.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
@@ -27,7 +33,7 @@ using testing::Thesis;
 
 Options Read(const std::string& text) { return ReadConfigText<Options>(text, "/cfg/x.yaml"); }
 
-// The errors of a text, without the name of the file before each.
+// Returns the errors of a text.
 std::string ErrorsOf(const std::string& text) {
   try {
     ReadConfigText<Options>(text, "x.yaml");
@@ -42,7 +48,7 @@ struct Wrong {
   std::string error;
 };
 
-TEST(Config, SaysExactlyWhatIsWrong) {
+TEST(Config, MessagesAreExact) {
   const std::vector<Wrong> cases = {
       // Keys.
       {"radus_mm: 1", "x.yaml:1:1: radus_mm: unknown key; did you mean 'radius_mm'?"},
@@ -72,15 +78,15 @@ TEST(Config, SaysExactlyWhatIsWrong) {
        "x.yaml:1:12: radius_mm: 1e999 does not fit; expected a number between 1e-308 and 1e308 "
        "in size"},
       {"radius_mm: 010.5",
-       "x.yaml:1:12: radius_mm: '010.5' is not plainly decimal; write a number without a leading "
+       "x.yaml:1:12: radius_mm: '010.5' is not a plain decimal; write a number without a leading "
        "0"},
       {"count: 010",
-       "x.yaml:1:8: count: '010' is not plainly decimal; write a whole number without a leading 0"},
+       "x.yaml:1:8: count: '010' is not a plain decimal; write a whole number without a leading 0"},
       {"count: 0o17",
-       "x.yaml:1:8: count: '0o17' is not plainly decimal; write a whole number without a leading "
+       "x.yaml:1:8: count: '0o17' is not a plain decimal; write a whole number without a leading "
        "0"},
       {"count: 0x1F",
-       "x.yaml:1:8: count: '0x1F' is not plainly decimal; write a whole number without a leading "
+       "x.yaml:1:8: count: '0x1F' is not a plain decimal; write a whole number without a leading "
        "0"},
       {"radius_mm: \"2.5\"",
        "x.yaml:1:12: radius_mm: expected a number, found the text \"2.5\"; remove the quotes"},
@@ -92,10 +98,8 @@ TEST(Config, SaysExactlyWhatIsWrong) {
       {"radius_mm: 12", "x.yaml:1:12: radius_mm: 12 is out of range; allowed is 0 to 10 mm"},
       {"limit: -1", "x.yaml:1:8: limit: -1 is out of range; allowed is at least 0"},
       {"count: 0", "x.yaml:1:8: count: 0 is out of range; allowed is 1 to 100"},
-      {"count: 1.5",
-       "x.yaml:1:8: count: expected a whole number, found 1.5; write it in digits alone"},
-      {"count: 1e1",
-       "x.yaml:1:8: count: expected a whole number, found 1e1; write it in digits alone"},
+      {"count: 1.5", "x.yaml:1:8: count: expected a whole number, found 1.5; write only digits"},
+      {"count: 1e1", "x.yaml:1:8: count: expected a whole number, found 1e1; write only digits"},
       {"count: three", "x.yaml:1:8: count: expected a whole number, found 'three'"},
       {"count: +-3", "x.yaml:1:8: count: expected a whole number, found '+-3'"},
       {"count: 2147483648",
@@ -105,15 +109,15 @@ TEST(Config, SaysExactlyWhatIsWrong) {
        "18446744073709551615"},
       {"random_seed: -1",
        "x.yaml:1:14: random_seed: -1 does not fit; allowed is 0 to 18446744073709551615"},
-      // Texts that swallow what follows.
+      // Texts that continue on the next line.
       {"label: \"a\ncount: 3\"",
-       "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (a text "
-       "of several lines is written as a block, after |)"},
+       "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (write "
+       "a text of several lines as a block, after |)"},
       {"label: 'it''s\ncount: 3'",
-       "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (a text "
-       "of several lines is written as a block, after |)"},
+       "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (write "
+       "a text of several lines as a block, after |)"},
       {"{label: a\n  b}",
-       "x.yaml:1:9: label: a text within brackets goes on in the next line; is a comma or a "
+       "x.yaml:1:9: label: a text within brackets continues on the next line; is a comma or a "
        "bracket missing?"},
       // Kinds.
       {"radius_mm: {a: 1}", "x.yaml:1:12: radius_mm: expected a number, found a map"},
@@ -134,7 +138,7 @@ TEST(Config, SaysExactlyWhatIsWrong) {
       {"verbose: \"true\"",
        "x.yaml:1:10: verbose: expected true or false, found the text \"true\""},
       {"verbose: 1", "x.yaml:1:10: verbose: expected true or false, found '1'"},
-      // Null; the place is that of the key.
+      // Null has the location of its key.
       {"count: null", "x.yaml:1:1: count: expected a whole number, found nothing (null)"},
       {"count:\nlabel: a", "x.yaml:1:1: count: expected a whole number, found nothing (null)"},
       {"label: ~", "x.yaml:1:1: label: expected a text, found nothing (null)"},
@@ -163,7 +167,7 @@ TEST(Config, SaysExactlyWhatIsWrong) {
       {"label: \xff", "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
       {"label: \xed\xa0\x80",  // half of a pair of UTF-16
        "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
-      {"label: \xe0\x80\x80",  // longer than it need be
+      {"label: \xe0\x80\x80",  // longer than needed
        "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
       {"label: \xf0\x80\x80\x80", "x.yaml:1:8: a byte that is not UTF-8; save the file as UTF-8"},
       {"label: \xf4\x90\x80\x80",  // above U+10FFFF
@@ -198,7 +202,7 @@ TEST(Config, WhatIsTooDeepOrTooLargeIsRefusedBeforeItIsFollowed) {
   EXPECT_THAT(ErrorsOf(nested(63)), Not(HasSubstr("levels")));
   for (const std::size_t levels : {64, 400, 100000}) {
     EXPECT_THAT(ErrorsOf(nested(levels)),
-                HasSubstr("more than 64 levels of maps and lists within each other"));
+                HasSubstr("more than 64 levels of nested maps and lists"));
   }
   std::string keys;
   for (int k = 0; k <= 10'000; ++k) {
@@ -270,7 +274,7 @@ TEST(Config, AMissingFileIsAnIoError) {
   EXPECT_THROW(ReadConfig<Options>(SEMBLANCE_SOURCE_DIR), IoError);
 }
 
-// Distances by hand.
+// The expected distances were counted by hand.
 TEST(NearestWord, CountsEditsAndSwaps) {
   EXPECT_EQ(EditDistance("kitten", "sitting"), 3);
   EXPECT_EQ(EditDistance("fiel", "file"), 1);
@@ -279,11 +283,12 @@ TEST(NearestWord, CountsEditsAndSwaps) {
   const std::vector<std::string> known = {"thesis", "split", "flat"};
   EXPECT_EQ(NearestWord("splt", known), "split");
   EXPECT_EQ(NearestWord("voronoi", known), "");
-  EXPECT_EQ(NearestWord(std::string(100'000'000, 's'), known), "");  // in no memory to speak of
+  EXPECT_EQ(NearestWord(std::string(100'000'000, 's'), known),
+            "");  // must not allocate by the length
 }
 
-// A run's folder that was sent to somebody: what went in lies beside resolved.yaml.
-TEST(Config, AWholePathThatLeadsNowhereIsAFileBesideThisOne) {
+// Simulates a run's folder on another machine: the inputs lie beside resolved.yaml.
+TEST(Config, AnAbsolutePathThatDoesNotExistIsAFileBesideThisOne) {
   const testing::ScratchFolder folder;
   const std::filesystem::path file = folder / "resolved.yaml";
   const auto skull = [&](const std::filesystem::path& named) {
@@ -293,11 +298,344 @@ TEST(Config, AWholePathThatLeadsNowhereIsAFileBesideThisOne) {
   EXPECT_EQ(skull("/elsewhere/heads/skull.ply"), "/elsewhere/heads/skull.ply");
   WriteFileAtomically(folder / "skull.ply", "ply");
   EXPECT_EQ(skull("/elsewhere/heads/skull.ply"), folder / "skull.ply");
-  // A file that is there is taken as it is named, and so is a path that is not whole.
+  // An existing file and a relative path are taken as written.
   std::filesystem::create_directories(folder / "heads");
   EXPECT_EQ(skull("heads/skull.ply"), folder / "heads/skull.ply");
   WriteFileAtomically(folder / "heads/skull.ply", "ply");
   EXPECT_EQ(skull(folder / "heads/skull.ply"), folder / "heads/skull.ply");
+}
+
+// A folder of small files that is removed after the test.
+class ConfigFiles : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = std::filesystem::path(::testing::TempDir()) / (std::string("config_") + info->name());
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_ / "sub");
+  }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+
+  std::filesystem::path Write(const std::string& name, const std::string& text) {
+    std::ofstream(folder_ / name) << text;
+    return folder_ / name;
+  }
+  std::string ErrorsOf(const std::filesystem::path& file) {
+    try {
+      ReadConfig<Options>(file);
+      return "no error";
+    } catch (const ConfigError& error) {
+      return error.what();
+    }
+  }
+  std::filesystem::path folder_;
+};
+
+Options Set(const std::string& text, const std::vector<std::string>& overrides) {
+  return ReadConfigText<Options>(text, "x.yaml", overrides);
+}
+
+std::string SetErrors(const std::string& text, const std::vector<std::string>& overrides) {
+  try {
+    Set(text, overrides);
+    return "no error";
+  } catch (const ConfigError& error) {
+    return error.what();
+  }
+}
+
+TEST_F(ConfigFiles, AFileIsMergedOverItsBaseKeyByKey) {
+  Write("sub/grand.yaml", "label: grand\ncount: 9\nskull: g.ply\n");
+  Write("sub/base.yaml",
+        "base: grand.yaml\nlast: {level: 2, fraction: 0.25}\nschedule: [{level: 5}, {level: 6}]\n"
+        "emitter: {type: flat, rings: 7}\nvalues: {a: 1, b: 2}\n");
+  const auto file = Write("top.yaml",
+                          "base: sub/base.yaml\nlast: {level: 3}\nschedule: [{level: 1}]\n"
+                          "label: top\nemitter: {rings: 8}\nvalues: {b: null, c: 3}\n");
+  const Options options = ReadConfig<Options>(file);
+  EXPECT_EQ(options.label, "top");
+  EXPECT_EQ(options.count, 9);
+  EXPECT_EQ(options.skull, folder_ / "sub" / "g.ply");  // relative to the file that names it
+  EXPECT_EQ(options.last, (testing::Step{3, 0.25}));
+  EXPECT_EQ(options.schedule, (std::vector<testing::Step>{{1, 0.4}}));
+  EXPECT_EQ(std::get<Flat>(options.emitter).rings, 8);
+  EXPECT_EQ(options.values, (std::map<std::string, std::optional<double>>{
+                                {"a", 1.0}, {"b", std::nullopt}, {"c", 3.0}}));
+}
+
+TEST_F(ConfigFiles, EachBaseIsMergedOverThoseBeforeIt) {
+  Write("sub/shared.yaml", "count: 9\n");
+  Write("sub/first.yaml", "base: shared.yaml\nlabel: first\nskull: f.ply\nemitter: flat\n");
+  Write("second.yaml", "base: sub/shared.yaml\nlabel: second\nemitter: {type: thesis, decay: 3}\n");
+  const Options options = ReadConfig<Options>(
+      Write("top.yaml", "base: [sub/first.yaml, second.yaml]\nlast: {level: 3}\n"));
+  EXPECT_EQ(options.label, "second");
+  EXPECT_EQ(options.count, 9);  // both have the same base
+  EXPECT_EQ(options.skull, folder_ / "sub" / "f.ply");
+  EXPECT_EQ(options.emitter, decltype(Options::emitter)(Thesis{3}));
+  EXPECT_EQ(options.last.level, 3);
+}
+
+// Each file names the next file twice, which would be 2^70 files.
+TEST_F(ConfigFiles, TheNumberOfBasesIsLimited) {
+  for (int k = 0; k < 70; ++k) {
+    Write(fmt::format("{}.yaml", k), fmt::format("base: [{0}.yaml, {0}.yaml]\n", k + 1));
+  }
+  Write("70.yaml", "count: 1\n");
+  EXPECT_THAT(ErrorsOf(folder_ / "0.yaml"),
+              HasSubstr("base: more than 64 bases, including bases of bases"));
+}
+
+TEST_F(ConfigFiles, AnotherTypeReplacesAVariantWholly) {
+  Write("base.yaml", "emitter: {type: flat, rings: 7}\n");
+  const auto other = Write("other.yaml", "base: base.yaml\nemitter: {type: thesis}\n");
+  EXPECT_EQ(ReadConfig<Options>(other).emitter, (decltype(Options::emitter){Thesis{}}));
+  const auto same = Write("same.yaml", "base: base.yaml\nemitter: {type: flat}\n");
+  EXPECT_EQ(std::get<Flat>(ReadConfig<Options>(same).emitter).rings, 7);
+  const auto bare = Write("bare.yaml", "base: base.yaml\nemitter: flat\n");
+  EXPECT_EQ(std::get<Flat>(ReadConfig<Options>(bare).emitter).rings, 2);
+  Write("name.yaml", "emitter: thesis\n");
+  const auto more = Write("more.yaml", "base: name.yaml\nemitter: {decay: 9}\n");
+  EXPECT_EQ(std::get<Thesis>(ReadConfig<Options>(more).emitter).decay, 9);
+}
+
+TEST_F(ConfigFiles, BadBasesAreErrorsWithTheirLocation) {
+  const auto a = Write("a.yaml", "base: b.yaml\n");
+  Write("b.yaml", "base: a.yaml\n");
+  EXPECT_EQ(ErrorsOf(a),
+            (folder_ / "b.yaml").string() + ":1:7: base: 'a.yaml' would be its own base");
+  const auto lost = Write("lost.yaml", "count: 0\nbase: none.yaml\n");
+  EXPECT_EQ(ErrorsOf(lost), lost.string() +
+                                ":1:8: count: 0 is out of range; allowed is 1 to 100\n" +
+                                lost.string() + ":2:7: base: " + (folder_ / "none.yaml").string() +
+                                ": no such file; paths are relative to this file");
+  for (const char* no_file : {"base: []\n", "base: {a: b}\n", "base: [[a]]\n", "base: [\"\"]\n"}) {
+    EXPECT_THAT(ErrorsOf(Write("list.yaml", no_file)), HasSubstr("expected the path of a file"));
+  }
+  EXPECT_THAT(
+      ErrorsOf(Write("list.yaml", "base: [lost.yaml, other.yaml]\n")),
+      HasSubstr("list.yaml:1:19: base: " + (folder_ / "other.yaml").string() + ": no such"));
+  Write("wrong.yaml", "count: x\n");
+  EXPECT_EQ(ErrorsOf(Write("over.yaml", "base: wrong.yaml\n")),
+            (folder_ / "wrong.yaml").string() + ":1:8: count: expected a whole number, found 'x'");
+}
+
+TEST(ConfigSet, SetsEntriesOfMapsListsAndVariants) {
+  EXPECT_EQ(Set("", {"count=5"}).count, 5);
+  EXPECT_EQ(Set("last: {fraction: 0.5}", {"last.level=4"}).last, (testing::Step{4, 0.5}));
+  EXPECT_EQ(Set("", {"schedule[1].fraction=0.9"}).schedule,
+            (std::vector<testing::Step>{{0, 0.4}, {1, 0.9}}));  // of the default list
+  EXPECT_EQ(Set("schedule: [{level: 2}]", {"schedule[0].fraction=0.9"}).schedule,
+            (std::vector<testing::Step>{{2, 0.9}}));
+  EXPECT_EQ(Set("", {"schedule=[{level: 6}]"}).schedule.size(), 1u);
+  EXPECT_EQ(std::get<Flat>(Set("", {"emitter.rings=4"}).emitter).rings, 4);
+  EXPECT_EQ(std::get<Thesis>(Set("emitter: thesis", {"emitter.decay=4"}).emitter).decay, 4);
+  EXPECT_EQ(std::get<Thesis>(Set("emitter: {rings: 3}", {"emitter=thesis"}).emitter), Thesis{});
+  const Options mixed = Set("", {"emitter=mixed", "emitter.rest={type: thesis, decay: 2}"});
+  EXPECT_EQ(std::get<Mixed>(mixed.emitter).rest, testing::Emitter{Thesis{.decay = 2}});
+  EXPECT_EQ(Set("values: {a: 1}", {"values.b=null"}).values.size(), 2u);
+  EXPECT_EQ(Set("limit: 4", {"limit="}).limit, std::nullopt);
+  EXPECT_EQ(Set("", {"count=5", "count=6"}).count, 6);
+}
+
+TEST(ConfigSet, AnotherTypeDropsTheOptionsOfLowerLayers) {
+  const auto thesis = [](double decay) { return decltype(Options::emitter)(Thesis{decay}); };
+  EXPECT_EQ(Set("", {"emitter.type=thesis"}).emitter, thesis(6));  // the default is flat
+  EXPECT_EQ(Set("emitter: {type: flat, rings: 7}", {"emitter.type=thesis"}).emitter, thesis(6));
+  EXPECT_EQ(Set("emitter: {rings: 7}", {"emitter.type=thesis"}).emitter, thesis(6));
+  EXPECT_EQ(Set("emitter: flat", {"emitter.type=thesis", "emitter.decay=4"}).emitter, thesis(4));
+  EXPECT_EQ(std::get<Flat>(Set("emitter: {rings: 7}", {"emitter.type=flat"}).emitter).rings, 7);
+  const std::string mixed = "emitter: {type: mixed, rest: {type: flat, rings: 4}}";
+  EXPECT_EQ(Set(mixed, {"emitter.type=thesis", "emitter.decay=3"}).emitter, thesis(3));
+}
+
+TEST(ConfigSet, AnotherTypeRefusesOptionsOfTheFormerTypeInTheSameLayer) {
+  const auto refused = HasSubstr("--set emitter.rings=4: emitter.rings: unknown key");
+  EXPECT_THAT(SetErrors("", {"emitter.rings=4", "emitter.type=thesis"}), refused);
+  EXPECT_THAT(SetErrors("emitter: {rings: 7}", {"emitter.type=thesis", "emitter.rings=4"}),
+              refused);
+}
+
+TEST(ConfigSet, PathsAreRelativeToTheCurrentFolder) {
+  EXPECT_EQ(
+      ReadConfigText<Options>("", "/far/x.yaml", std::vector<std::string>{"skull=s.ply"}).skull,
+      std::filesystem::current_path() / "s.ply");
+}
+
+TEST(ConfigSet, ErrorsNameTheOverride) {
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"count=0", "--set count=0: count: 0 is out of range; allowed is 1 to 100"},
+      {"cuont=2", "--set cuont=2: cuont: unknown key; did you mean 'count'?"},
+      {"lst.level=2", "--set lst.level=2: lst: unknown key; did you mean 'last'?"},
+      {"last.levl=2", "--set last.levl=2: last.levl: unknown key; did you mean 'level'?"},
+      {"count", "--set count: an override is written as path=value"},
+      {"count=", "--set count=: count: expected a whole number, found nothing (null)"},
+      {"=3", "--set =3: : not a path; write it like a.b[0].c"},
+      {"a..b=3", "--set a..b=3: a..b: not a path; write it like a.b[0].c"},
+      {"schedule[x]=3", "--set schedule[x]=3: schedule[x]: not a path; write it like a.b[0].c"},
+      {"schedule[2].level=3",
+       "--set schedule[2].level=3: schedule[2]: past the end; the list has 2 items, counted from "
+       "0"},
+      {"schedule.level=3",
+       "--set schedule.level=3: schedule.level: this is an entry of a list; write its index, like "
+       "[0]"},
+      {"count[0]=3", "--set count[0]=3: count[0]: an index needs a list, and there is none"},
+      {"tags=[a", "--set tags=[a: this is not YAML: end of sequence flow not found"},
+      {"emitter.decay=3",
+       "--set emitter.decay=3: emitter.decay: unknown key; known are: rings, type"},
+  };
+  for (const auto& [text, error] : cases) {
+    EXPECT_EQ(SetErrors("", {text}), error);
+  }
+  EXPECT_EQ(SetErrors("label: [1]", {"count=0"}),
+            "x.yaml:1:8: label: expected a text, found a list\n"
+            "--set count=0: count: 0 is out of range; allowed is 1 to 100");
+}
+
+// Random values: doubles of all magnitudes, and texts of all bytes that YAML can hold.
+Options RandomOptions(Random& random) {
+  const auto number = [&] {
+    return std::ldexp(random.Uniform(-1, 1), int(random.Uniform(-1070, 1020)));
+  };
+  Options options;
+  options.verbose = random.Uniform(0, 1) < 0.5;
+  options.count = static_cast<int>(random.Uniform(1, 100));
+  options.random_seed = std::bit_cast<std::uint64_t>(random.Uniform(0, 1)) * 7919;
+  options.radius_mm = random.Uniform(0, 10);
+  for (int i = 0; i < 8; ++i) {
+    options.label += static_cast<char>(random.Uniform(1, 127));
+  }
+  options.center_mm = {number(), number(), -0.0};
+  options.sex = random.Uniform(0, 1) < 0.5 ? testing::Sex::kMale : testing::Sex::kFemale;
+  options.schedule.assign(3, {2, random.Uniform(0, 1)});
+  options.values = {{options.label, random.Uniform(0, 9)}, {"no", std::nullopt}, {"", 0.0}};
+  options.emitter = Mixed{.parts = {Flat{.rings = 5}, Thesis{.decay = random.Uniform(1, 9)}},
+                          .rest = Thesis{.decay = random.Uniform(1, 9)}};
+  options.tags = {"null", "yes", "~", "", " a ", "- b", "c: d", "# e", "1e3", "\xC3\xA4", "{", "'"};
+  return options;
+}
+
+TEST(ConfigWrite, ResolvedTextGivesTheSameValueAndTheSameText) {
+  Random random(20241);
+  for (int i = 0; i < 200; ++i) {
+    const Options options = RandomOptions(random);
+    const std::string text = WriteConfig(options);
+    const Options again = ReadConfigText<Options>(text, "x.yaml");
+    ASSERT_EQ(again, options) << text;
+    EXPECT_EQ(std::bit_cast<std::uint64_t>(again.center_mm[2]), std::bit_cast<std::uint64_t>(-0.0));
+    EXPECT_EQ(WriteConfig(again), text);
+  }
+  EXPECT_EQ(ReadConfigText<Options>(WriteConfig(Options{}), "x.yaml"), Options{});
+}
+
+TEST(ConfigWrite, IsReadableAndExplicit) {
+  Options options;
+  options.skull = "/data/skull.ply";
+  EXPECT_EQ(WriteConfig(options),
+            "verbose: false\ncount: 3\nrandom_seed: 1\nradius_mm: 2.5\nlabel: one\n"
+            "skull: /data/skull.ply\ncenter_mm: [0, 0, 0]\nsex: male\nlimit: null\nschedule:\n"
+            "  - level: 0\n    fraction: 0.4\n  - level: 1\n    fraction: 0.35\nvalues: {}\n"
+            "emitter:\n  type: flat\n  rings: 2\nlast:\n  level: 0\n  fraction: 0.4\ntags: []\n");
+}
+
+TEST(ConfigWrite, RefusesNumbersThatAreNotFinite) {
+  Options options;
+  options.center_mm[1] = std::nan("");
+  try {
+    WriteConfig(options);
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_STREQ(error.what(),
+                 "center_mm[1]: nan cannot be written to a configuration; only finite "
+                 "numbers can");
+  }
+}
+
+TEST(ConfigTree, SetPathSetsWholeTreesAndChangesNothingOnFailure) {
+  ConfigNode tree = ConfigNode::Map();
+  SetPath(tree, "a.b", ConfigNode::Scalar("1"));
+  ConfigNode more = ConfigNode::Map();
+  more.Set("c", ConfigNode::Scalar("2"));
+  SetPath(tree, "a", more);
+  EXPECT_EQ(ToFlowYaml(tree), "{a: {b: 1, c: 2}}");
+  EXPECT_THROW(SetPath(tree, "x.y[0]", more), ConfigError);
+  EXPECT_EQ(ToFlowYaml(tree), "{a: {b: 1, c: 2}}");
+}
+
+TEST(OptionsReference, HasTypeDefaultRangeUnitAndMeaning) {
+  const std::string text = OptionsReference<Options>();
+  EXPECT_THAT(text, HasSubstr("radius_mm: number, default 2.5, 0 to 10 mm\n    of the sphere\n"));
+  EXPECT_THAT(text, HasSubstr("sex: one of male, female, default male\n"));
+  EXPECT_THAT(text, HasSubstr("emitter: type, one of thesis, flat, mixed, default flat\n"));
+  EXPECT_THAT(text, HasSubstr("emitter.decay (type: thesis): number, default 6, 0.5 to 50\n"));
+  EXPECT_THAT(text, HasSubstr("schedule: list: map, default [{level: 0, fraction: 0.4}, {level: 1, "
+                              "fraction: 0.35}], at least 1 of them\n"));
+  EXPECT_THAT(text, HasSubstr("schedule[].level: whole number, default 0, 0 to 6\n"));
+  EXPECT_THAT(text, HasSubstr("values: map by name: number or null, default {}, at least 0 mm\n"));
+  EXPECT_THAT(text, HasSubstr("emitter.parts[].rings (type: mixed) (type: flat): whole number"));
+}
+
+// A struct that gives its parts other defaults than their own.
+struct Outer {
+  testing::Step step = {.level = 3};
+  testing::Emitter emitter = Thesis{.decay = 9};
+};
+template <class Visitor>
+void Fields(Visitor& visit, Outer& o) {
+  visit(FieldInfo{.name = "step"}, o.step);
+  visit(FieldInfo{.name = "emitter"}, o.emitter);
+}
+
+TEST(OptionsReference, HasTheDefaultsOfTheSurroundingStruct) {
+  const std::string text = OptionsReference<Outer>();
+  EXPECT_THAT(text, HasSubstr("step.level: whole number, default 3, 0 to 6\n"));
+  EXPECT_THAT(text, HasSubstr("emitter.decay (type: thesis): number, default 9, 0.5 to 50\n"));
+  EXPECT_THAT(text, HasSubstr("emitter.rings (type: flat): whole number, default 2, at least 1\n"));
+  const auto read = ReadConfigText<Outer>("emitter: thesis", "x.yaml").emitter;
+  EXPECT_EQ(std::get<Thesis>(read).decay, 9);
+}
+
+// Collects every path of a schema in the form of the reference.
+void CollectPaths(const nlohmann::json& schema, const std::string& path,
+                  std::set<std::string>& out) {
+  const nlohmann::json properties = schema.value("properties", nlohmann::json::object());
+  for (const auto& [key, inner] : properties.items()) {
+    const std::string inner_path = path.empty() ? key : path + "." + key;
+    out.insert(inner_path);
+    CollectPaths(inner, inner_path, out);
+  }
+  const nlohmann::json any_of = schema.value("anyOf", nlohmann::json::array());
+  for (const auto& inner : any_of) {
+    CollectPaths(inner, path, out);
+  }
+  if (schema.contains("items")) {
+    CollectPaths(schema["items"], path + "[]", out);
+  }
+}
+
+TEST(OptionsSchema, IsJsonAndHasEveryPathOfTheReference) {
+  const auto schema = nlohmann::json::parse(OptionsSchema<Options>());
+  EXPECT_EQ(schema["$schema"], "https://json-schema.org/draft/2020-12/schema");
+  std::set<std::string> paths;
+  CollectPaths(schema, "", paths);
+  std::istringstream reference(OptionsReference<Options>());
+  int count = 0;
+  for (std::string line; std::getline(reference, line);) {
+    if (!line.starts_with(' ')) {
+      ++count;
+      EXPECT_TRUE(paths.contains(line.substr(0, line.find_first_of(" :")))) << line;
+    }
+  }
+  EXPECT_EQ(count, 26);
+  EXPECT_TRUE(paths.contains("base"));
+  EXPECT_EQ(schema["properties"]["base"]["type"], nlohmann::json({"string", "array"}));
+  const auto& radius = schema["properties"]["radius_mm"];
+  EXPECT_EQ(radius["type"], "number");
+  EXPECT_EQ(radius["minimum"], 0);
+  EXPECT_EQ(radius["maximum"], 10);
+  EXPECT_EQ(radius["default"], 2.5);
+  EXPECT_EQ(schema["properties"]["schedule"]["minItems"], 1);
+  EXPECT_EQ(schema["additionalProperties"], false);
 }
 
 }  // namespace

@@ -10,14 +10,14 @@
 namespace semblance {
 namespace {
 
-TEST(TerminalText, LinesAndLettersStayControlsDoNot) {
+TEST(TerminalText, KeepsLinesAndLettersAndReplacesControlCharacters) {
   EXPECT_EQ(ForTerminal("one\ntwo\n"), "one\ntwo\n");
   EXPECT_EQ(ForTerminal("a\x1b[2Jb\n\x07\r\t\x7f"), "a?[2Jb\n????");
   EXPECT_EQ(ForTerminal("\u009bm\u00a0\u00e4\u2028"), "?m\u00a0\u00e4\u2028");
   EXPECT_EQ(ForTerminal("\xc2"), "\xc2") << "cut short";
 }
 
-// What a shell makes of one word.
+// Returns a word as a shell reads it.
 std::string Echoed(const std::string& word) {
   std::FILE* const shell = popen(fmt::format("printf %s {}", word).c_str(), "r");
   std::string said;

@@ -56,7 +56,7 @@ TEST(ValueFilter, NotBindsCloserThanAndAndAndCloserThanOr) {
   }
 }
 
-TEST(ValueFilter, OfSeveralValuesOneIsEnoughAndNoneMayBeEqualForUnequal) {
+TEST(ValueFilter, ComparesWithEachOfSeveralValues) {
   EXPECT_TRUE(Holds("tag = real", kTrial));
   EXPECT_FALSE(Holds("tag != real", kTrial));
   EXPECT_TRUE(Holds("tag != broken", kTrial));
@@ -64,9 +64,9 @@ TEST(ValueFilter, OfSeveralValuesOneIsEnoughAndNoneMayBeEqualForUnequal) {
   EXPECT_TRUE(Holds("tag != odd", {}));
 }
 
-TEST(ValueFilter, SaysWhereAConditionIsNone) {
+TEST(ValueFilter, ReportsThePlaceOfAFault) {
   EXPECT_THAT(Refusal("subjct = a"), HasSubstr("unknown name 'subjct'; did you mean 'subject'?"));
-  EXPECT_THAT(Refusal("weight = 1"), HasSubstr("there are several 'weight'"));
+  EXPECT_THAT(Refusal("weight = 1"), HasSubstr("ambiguous name 'weight'"));
   EXPECT_THAT(Refusal("subject = a interp = b"), HasSubstr("at 'interp = b'"));
   EXPECT_THAT(Refusal("subject"), HasSubstr("at its end"));
   EXPECT_THAT(Refusal("subject ="), HasSubstr("a value is missing"));
@@ -78,7 +78,7 @@ TEST(ValueFilter, SaysWhereAConditionIsNone) {
     for (int n = 0; n < 100000; ++n) {
       deep += part;
     }
-    EXPECT_THAT(Refusal(deep + "subject = a"), HasSubstr("more than 64 parts"));
+    EXPECT_THAT(Refusal(deep + "subject = a"), HasSubstr("more than 64 nested parts"));
   }
   EXPECT_THAT(WordsOf<InputError>([] { Holds("interp < 3", kTrial); }),
               HasSubstr("'kriging' is not a number"));

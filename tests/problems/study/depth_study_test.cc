@@ -54,9 +54,9 @@ TEST(DepthStudy, TheTruthIsThePhantomsOwnDepth) {
   EXPECT_LT(std::sqrt(squares / count), 0.25);  // the mesh's normals are not the exact ones
 }
 
-// Fewer dowels, moved ones and further ones, also outside the network, are compared over the same
-// bone.
-TEST(DepthStudy, TheBoneThatIsComparedRestsOnAllLandmarks) {
+// The compared bone is the same with fewer dowels, moved dowels, and further dowels inside and
+// outside the network.
+TEST(DepthStudy, TheComparedBoneDependsOnAllLandmarksAlone) {
   const std::vector<bool> all = Measured().truth->region.scored;
   const std::vector<Vec3> bone = MakePhantom({.random_seed = 1, .rings = 50}).skull.points;
   const Vec3 crown = *std::ranges::max_element(bone, {}, [](const Vec3& p) { return p.z(); });
@@ -69,7 +69,7 @@ TEST(DepthStudy, TheBoneThatIsComparedRestsOnAllLandmarks) {
   }
 }
 
-TEST(DepthStudy, AMapOfTheTrueDepthHasNoErrorButThoseOfNormals) {
+TEST(DepthStudy, AMapOfTheTrueDepthHasOnlyTheErrorOfTheNormals) {
   const ScratchFolder folder;
   const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 50});
   WriteFileAtomically(
@@ -87,7 +87,7 @@ TEST(DepthStudy, AMapOfTheTrueDepthHasNoErrorButThoseOfNormals) {
   }
 }
 
-TEST(DepthStudy, ErrorsAreInterpolatedLessTrueAndTheMeansDepthIsEverywhereTheSame) {
+TEST(DepthStudy, ErrorsAreInterpolatedMinusTrueDepth) {
   const DepthResult result = Measured({"interp=mean"});
   const DepthComparison& truth = *result.truth;
   const double mean = result.stage->depth.depth_mm[0];
@@ -97,7 +97,7 @@ TEST(DepthStudy, ErrorsAreInterpolatedLessTrueAndTheMeansDepthIsEverywhereTheSam
     }
   }
   EXPECT_LT(truth.tips.rms_mm, truth.along_direction.all.rms_mm);  // tips go to the closest skin
-  // The mean states no sd; one is learned from left-out landmarks, everywhere where there is depth.
+  // The mean states no sd. It is learned from left-out landmarks, for all vertices with a depth.
   EXPECT_EQ(truth.along_direction.scores.stated, truth.along_direction.scores.points);
   EXPECT_NEAR(truth.along_direction.scores.rmse_mm, truth.along_direction.all.rms_mm, 1e-9);
   EXPECT_NEAR(truth.along_direction.scores.bias_mm, truth.along_direction.all.mean_signed_mm, 1e-9);
@@ -108,14 +108,14 @@ TEST(DepthStudy, ErrorsAreInterpolatedLessTrueAndTheMeansDepthIsEverywhereTheSam
   EXPECT_NEAR(area, truth.along_direction.all.area_cm2, 1e-9);
 }
 
-TEST(DepthStudy, KrigingStatesAnSdThatMostErrorsKeepTo) {
+TEST(DepthStudy, MostErrorsLieWithinTheSdOfKriging) {
   const DepthResult result = Measured({"interp=kriging"});
   EXPECT_GT(result.truth->along_direction.coverage_90, 0.6);
   EXPECT_LE(result.truth->along_direction.coverage_90, 1);
 }
 
-// Every scheme's 90 % holds most of the true depths, stated by itself or learned.
-TEST(DepthStudy, EverySchemeStatesAnSdThatIsHonestEnough) {
+// The 90 % interval of every scheme, stated or learned, contains most true depths.
+TEST(DepthStudy, TheIntervalsOfEverySchemeHoldMostDepths) {
   for (const char* scheme : {"auto", "barycentric", "natural_neighbour", "biharmonic"}) {
     const double within =
         Measured({fmt::format("interp={}", scheme)}).truth->along_direction.scores.coverage_90;
@@ -124,8 +124,8 @@ TEST(DepthStudy, EverySchemeStatesAnSdThatIsHonestEnough) {
   }
 }
 
-// A side left out leaves a network on one side alone: the scheme answers there nowhere.
-TEST(DepthStudy, ASideLeftOutSaysWhereTheSchemeAnswersAndWhereTheRule) {
+// Without one side the network covers only the other; the scheme has almost no value on the first.
+TEST(DepthStudy, ALeftOutSideIsPredictedByTheOutsideRule) {
   const DepthResult result = Measured({"interp=barycentric"});
   const CrossValidation& side = result.left_out[1].second;
   EXPECT_EQ(side.scores_with_rule.points, 22);
@@ -134,7 +134,7 @@ TEST(DepthStudy, ASideLeftOutSaysWhereTheSchemeAnswersAndWhereTheRule) {
   EXPECT_GT(everywhere.scores.points, 10);
 }
 
-TEST(DepthStudy, AutoSaysWhatItTook) {
+TEST(DepthStudy, AutoReportsItsWeights) {
   const Experiment experiment = SmallPhantom({"interp=auto"});
   const DepthResult result = MeasureDepth(experiment, {});
   const Json shares = DepthResultJson(experiment, result).at("depth").at("shares");
@@ -146,9 +146,9 @@ TEST(DepthStudy, AutoSaysWhatItTook) {
   EXPECT_THAT(DepthText(result), HasSubstr("weights: radial_basis 0."));
 }
 
-// No ray to the skin is shorter than the way to the closest skin, and almost none of two directions
-// is as long.
-TEST(DepthStudy, TheDirectionTurnsTheEndsAndTheTruthAlongIt) {
+// No ray to the skin is shorter than the distance to the closest skin, and rays of two directions
+// almost never have the same length.
+TEST(DepthStudy, TheDirectionChangesTheEndsAndTheTruthAlongIt) {
   const DepthComparison normal = *Measured().truth;
   for (const std::string direction :
        {"dowel_direction", "{type: smoothed_normal, radius_mm: 15}"}) {
@@ -224,7 +224,7 @@ TEST(DepthStudy, TheFolderHoldsMeshesWithTheirNumbers) {
             ReadMesh(folder / "out" / "depth.ply").points.size());
 }
 
-TEST(DepthStudy, AsAStudyItRanksBreaksDownAndShowsTheFirstSubjectsMaps) {
+TEST(DepthStudy, AStudyRanksHasSubtablesAndShowsTheFirstSubjectsMaps) {
   const ScratchFolder folder;
   WriteFileAtomically(folder / "study.yaml",
                       fmt::format("base: {}/configs/phantom.yaml\nset: {{subject.rings: 40}}\n"
@@ -265,7 +265,7 @@ TEST(DepthStudy, AsAStudyItRanksBreaksDownAndShowsTheFirstSubjectsMaps) {
   EXPECT_THAT(ReadFileBytes(folder / "out" / "report.html"), HasSubstr("Depth maps"));
 }
 
-TEST(DepthStudy, SaysWhatIsWrongWithAJob) {
+TEST(DepthStudy, ReportsAnUnknownJob) {
   const ScratchFolder folder;
   WriteFileAtomically(folder / "study.yaml",
                       fmt::format("base: {}/configs/phantom.yaml\njob: depths\n"

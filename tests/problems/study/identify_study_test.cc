@@ -49,7 +49,7 @@ TEST_F(IdentifyStudy, TheGalleryIsTheSubjectsAndTheOthers) {
   EXPECT_NE(plan.trials[0].id, Plan().trials[0].id) << "the rank depends on the gallery";
 }
 
-TEST_F(IdentifyStudy, WhatIsWrongIsSaidAtItsPlace) {
+TEST_F(IdentifyStudy, FaultsAreReported) {
   const auto fault = [&](const std::string& text) -> std::string {
     try {
       Plan(text);
@@ -67,7 +67,7 @@ TEST_F(IdentifyStudy, WhatIsWrongIsSaidAtItsPlace) {
   EXPECT_THROW(ReadStudy(folder_ / "study.yaml"), ConfigError);
 }
 
-TEST_F(IdentifyStudy, TheTrueFaceComesFirstAndOneFaceForAllComesByChance) {
+TEST_F(IdentifyStudy, TheTrueFaceRanksFirstAndTheGenericFaceByChance) {
   const StudyPlan plan = Plan();
   StageCache cache(20);
   std::set<double> floor_ranks;
@@ -85,7 +85,7 @@ TEST_F(IdentifyStudy, TheTrueFaceComesFirstAndOneFaceForAllComesByChance) {
   EXPECT_EQ(floor_ranks, (std::set<double>{1, 2, 3}));
 }
 
-TEST_F(IdentifyStudy, TheReportHasTheCurvesAndSaysThatTheGalleryIsSmall) {
+TEST_F(IdentifyStudy, TheReportHasTheCurvesAndWarnsOfASmallGallery) {
   RunStudy(Plan(), folder_ / "out", {}, {});
   OutputFolder output(folder_ / "out", WhenNotEmpty::kReplaceFiles);
   const StudyResults results = WriteStudyTables(output);

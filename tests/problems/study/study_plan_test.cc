@@ -9,7 +9,7 @@
 #include <set>
 #include <string>
 
-#include "problems/study/study_rows.h"
+#include "problems/study/study_file.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
@@ -94,18 +94,21 @@ TEST_F(StudyPlanTest, SamplesStayInTheirRangesAndFillThem) {
   EXPECT_EQ(slices.size(), 10u);  // one in each tenth
 }
 
-TEST(StudySamples, SobolPointsAreEvenInEachHalf) {
-  const auto points = UnitSamples(SampleMethod::kSobol, 15, 2, 0);
+TEST_F(StudyPlanTest, SobolSamplesAreEvenInEachHalfOfARange) {
+  const StudyPlan plan = Plan(
+      "sample: {method: sobol, n: 15, ranges: {seeds.weight: [1.0, 2.0], rounds: [1, "
+      "5]}}\n");
+  ASSERT_EQ(plan.trials.size(), 15u);
+  const Experiment& first = plan.trials[0].experiment;
+  EXPECT_NEAR(first.seeds.weight, 1.5, 1e-12);
   int low = 0;
-  for (const auto& p : points) {
-    low += p[0] < 0.5 ? 1 : 0;
+  for (const StudyTrial& trial : plan.trials) {
+    low += trial.experiment.seeds.weight < 1.5 ? 1 : 0;
   }
   EXPECT_EQ(low, 7);
-  EXPECT_NEAR(points[0][0], 0.5, 1e-12);
-  EXPECT_NEAR(points[0][1], 0.5, 1e-12);
 }
 
-TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
+TEST_F(StudyPlanTest, EveryFaultIsReportedOnceWithItsLine) {
   EXPECT_THAT(Faults("subjects: [{name: a}, {name: b}]\ngrid:\n  interp: [nearest, krigging]\n"),
               AllOf(HasSubstr("study.yaml:6:21: interp"), HasSubstr("krigging")));
   const std::string twice = Faults(
@@ -114,8 +117,9 @@ TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
   EXPECT_EQ(std::count(twice.begin(), twice.end(), '\n'), 0) << twice;
   EXPECT_THAT(Faults("grids: {}\n"), HasSubstr("did you mean 'grid'?"));
   EXPECT_THAT(Faults("grid: {interp: nearest}\n"), HasSubstr("grid.interp: expected a list"));
-  EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("go side by side"));
-  EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"), HasSubstr("must be the lower"));
+  EXPECT_THAT(Faults("zip: {rounds: [1, 2], title: [a]}\n"), HasSubstr("have the same length"));
+  EXPECT_THAT(Faults("sample: {n: 2, ranges: {rounds: [5, 1]}}\n"),
+              HasSubstr("must be lower than"));
   EXPECT_THAT(Faults("subjects: [{name: a}, {name: a}]\n"),
               HasSubstr("the name 'a' appears twice"));
   EXPECT_THAT(Faults("grid: {rounds: [2, 2]}\n"), HasSubstr("are the same experiment"));
@@ -124,7 +128,7 @@ TEST_F(StudyPlanTest, EveryFaultIsSaidOnceAtItsLine) {
               HasSubstr("base: the file of an experiment is missing"));
 }
 
-TEST_F(StudyPlanTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorIfNot) {
+TEST_F(StudyPlanTest, ASubjectWithMissingFilesIsSkippedIfOptionalElseAnError) {
   const std::string missing =
       "subjects: [{name: a}, {name: b, set: {subject: {type: files, skull: none.ply, landmarks: "
       "none.yaml}}";
@@ -134,7 +138,7 @@ TEST_F(StudyPlanTest, ASubjectWhoseFilesAreMissingIsSkippedIfOptionalAndAnErrorI
   EXPECT_THAT(Faults(missing + "}]\n"), HasSubstr("subject b: no such file"));
 }
 
-TEST_F(StudyPlanTest, WithoutSubjectsItIsAFaultOrForWhoOnlyLooksANote) {
+TEST_F(StudyPlanTest, NoSubjectIsAFaultOrForCheckANote) {
   const std::string text =
       "subjects: [{name: b, optional: true, set: {subject: {type: files, skull: none.ply, "
       "landmarks: none.yaml}}}]\n";
@@ -147,14 +151,11 @@ TEST_F(StudyPlanTest, WithoutSubjectsItIsAFaultOrForWhoOnlyLooksANote) {
                ConfigError);
 }
 
-TEST_F(StudyPlanTest, ASubjectHeldOutOfASearchIsNoneToSearchOn) {
-  const std::string text =
-      "subjects: [{name: b, optional: true, set: {subject: {type: files, skull: none.ply, "
-      "landmarks: none.yaml}}}]\n"
-      "search: {budget: 4, choices: {rounds: [1, 2]}, held_out: [{name: c}]}\n";
-  EXPECT_THAT(Faults(text), HasSubstr("study.yaml: no subject is left"));
-  EXPECT_THAT(ReadStudy(Write(kBase + text), WithoutSubjects::kNote).notes,
-              ElementsAre(HasSubstr("subject b: skipped"), HasSubstr("no subject is left")));
+TEST_F(StudyPlanTest, ASearchIsRefusedAndItsReplacementIsNamed) {
+  EXPECT_EQ(Faults("subjects: [{name: a}]\nsearch: {budget: 4}\n"),
+            (folder_ / "study.yaml").string() +
+                ":5:9: search: removed in 1.0; use Optuna, as docs/examples/search_with_optuna.py "
+                "does");
 }
 
 TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {
@@ -177,7 +178,7 @@ TEST_F(StudyPlanTest, TheStrictReaderReadsEveryPartOfTheFile) {
               HasSubstr("study.yaml:4:1: set: the key appears twice"));
 }
 
-TEST_F(StudyPlanTest, FaultsOfKeepMetricAndAxesAreToldTogetherAndOnce) {
+TEST_F(StudyPlanTest, FaultsOfKeepMetricAndAxesAreReportedTogetherAndOnce) {
   const std::string words = Faults(
       "subjects: [{name: a}, {name: b, set: {subject.random_seed: 2}}]\n"
       "grid:\n  interp: [nearest, krigging]\n  rounds: [1, 2000]\nkeep: all\nmetric: "
@@ -189,12 +190,12 @@ TEST_F(StudyPlanTest, FaultsOfKeepMetricAndAxesAreToldTogetherAndOnce) {
   EXPECT_EQ(std::count(words.begin(), words.end(), '\n'), 3) << words;
 }
 
-TEST_F(StudyPlanTest, AMetricMustBeOneThatTheJobAndTheSubjectsHave) {
+TEST_F(StudyPlanTest, TheJobAndTheSubjectsMustHaveTheMetric) {
   EXPECT_THAT(Faults("metric: face.rms_mm\njob: depth\n"), HasSubstr("no trial of job: depth"));
   EXPECT_NO_THROW(Plan("metric: cross_validation.landmark.sites.g\njob: depth\n"));
   EXPECT_NO_THROW(Plan("metric: cross_validation.side.sites.go_l\njob: depth\n"));
   EXPECT_THAT(Faults("metric: cross_validation.landmark.sites.go\njob: depth\n"),
-              HasSubstr("'go' is of a pair; write go_l or go_r"));
+              HasSubstr("'go' is a paired site; write go_l or go_r"));
   EXPECT_THAT(Faults("metric: cross_validation.foo.sites.g\njob: depth\n"),
               HasSubstr("no trial of job: depth"));
   for (const char* metric : {"depth.process.length_mm", "depth.shares.kriging",
@@ -213,12 +214,12 @@ TEST_F(StudyPlanTest, AMetricMustBeOneThatTheJobAndTheSubjectsHave) {
               HasSubstr("measured against the true skin, which no subject has"));
 }
 
-TEST_F(StudyPlanTest, AConditionChoosesTrialsBySubjectTagAndAxes) {
+TEST_F(StudyPlanTest, AConditionSelectsTrialsBySubjectTagAndAxes) {
   const StudyPlan plan = Plan(
       "subjects: [{name: a, tags: [odd]}, {name: b, tags: [even, big], set: {subject.random_seed: "
       "7}}]\ngrid: {interp: [nearest, mean], rounds: [1, 2, 10]}\n");
   const auto count = [&](const std::string& condition) {
-    const std::vector<bool> chosen = TrialsThat(plan, condition);
+    const std::vector<bool> chosen = SelectTrials(plan, condition);
     return std::count(chosen.begin(), chosen.end(), true);
   };
   EXPECT_EQ(count(""), 12);
@@ -228,7 +229,7 @@ TEST_F(StudyPlanTest, AConditionChoosesTrialsBySubjectTagAndAxes) {
   EXPECT_EQ(count("id = " + plan.trials[3].id), 1);
 }
 
-TEST_F(StudyPlanTest, AnAxisOfTypesTakesEachWithItsOwnDefaults) {
+TEST_F(StudyPlanTest, EachTypeOfAnAxisHasItsOwnDefaults) {
   const StudyPlan plan = Plan("grid: {interp.type: [network_spline, natural_neighbour]}\n");
   ASSERT_EQ(plan.trials.size(), 2u);
   EXPECT_TRUE(std::holds_alternative<NaturalNeighbour>(plan.trials[1].experiment.interp));

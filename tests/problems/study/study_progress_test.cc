@@ -16,7 +16,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ScratchFolder;
 
-TEST(StudyEta, SaysRateAndTimeLeftOfWhatWasDoneHere) {
+TEST(StudyEta, HasRateAndRemainingTimeFromTheTrialsOfThisCall) {
   EXPECT_EQ(EtaText({.trials = 80, .finished = 30, .finished_before = 20, .elapsed_s = 40}),
             "30 of 80 trials, 4.0 s each, about 3 min left");
   EXPECT_EQ(EtaText({.trials = 80, .finished = 21, .finished_before = 1, .elapsed_s = 4}),
@@ -28,12 +28,6 @@ TEST(StudyEta, SaysRateAndTimeLeftOfWhatWasDoneHere) {
             "3 of 8 trials, 75 s so far");
 }
 
-TEST(StudyEta, OfASearchItCountsWhatIsStillToBeAskedFor) {
-  EXPECT_EQ(EtaText({.trials = 8, .finished = 8, .elapsed_s = 16, .later = 12}),
-            "8 of about 20 trials, 2.0 s each, about 24 s left");
-  EXPECT_EQ(BarText({.trials = 4, .finished = 4, .later = 4}, 8), "[####....]");
-}
-
 TEST(StudyEta, TheBarFillsFromEmptyToFull) {
   EXPECT_EQ(BarText({.trials = 4, .finished = 0}, 8), "[........]");
   EXPECT_EQ(BarText({.trials = 4, .finished = 3}, 8), "[######..]");
@@ -41,7 +35,7 @@ TEST(StudyEta, TheBarFillsFromEmptyToFull) {
   EXPECT_EQ(BarText({.trials = 0}, 4), "[####]");
 }
 
-TEST(StudyProgress, OffATerminalSaysFailuresAndTheEndAndLittleElse) {
+TEST(StudyProgress, WithoutATerminalPrintsFailuresAndTheEnd) {
   const ScratchFolder folder;
   std::FILE* file = std::fopen((folder / "log").c_str(), "w");
   StudyProgress progress(file, std::chrono::hours(1));

@@ -31,7 +31,7 @@ std::string Output(const std::string& command, const fs::path& file) {
   return ReadFileBytes(file);
 }
 
-// A stand-in for sbatch that tells what it was given and gives a job number.
+// A replacement of sbatch prints its arguments and returns a job number.
 TEST(SubmitScript, GivesSbatchAnArrayAndAMergeThatWaitsForIt) {
   const ScratchFolder folder;
   WriteFileAtomically(
@@ -53,7 +53,7 @@ TEST(SubmitScript, GivesSbatchAnArrayAndAMergeThatWaitsForIt) {
   EXPECT_THAT(given, HasSubstr("--array=0-3\n--cpus-per-task=2\n"));
   EXPECT_THAT(given, HasSubstr("\n--partition=long haul\n--wrap='/bin/echo' study "));
   EXPECT_THAT(given, HasSubstr("\n--dependency=afterany:7\n"));
-  // What a node would run, run here.
+  // Runs the command of a node.
   const std::size_t at = given.find("--wrap=") + 7;
   WriteFileAtomically(folder / "wrapped.sh", given.substr(at, given.find('\n', at) - at));
   EXPECT_EQ(Output(fmt::format("SLURM_ARRAY_TASK_ID=3 sh '{}'", (folder / "wrapped.sh").string()),
@@ -86,7 +86,7 @@ class SlurmTest : public ::testing::Test {
   fs::path Slurm() const { return folder_ / "slurm"; }
   std::string Ask(const std::string& command) { return Output(command, folder_ / "answer"); }
 
-  // False if `done` does not come true within the test's patience.
+  // Returns false if `done` does not return true within the patience of the test.
   bool Await(const std::function<bool()>& done) const {
     const Clock::time_point start = Clock::now();
     while (Clock::now() - start < patience_) {
@@ -126,7 +126,7 @@ TEST_F(SlurmTest, ALostNodeChangesNoByteOfTheMergedTable) {
       Await([&] { return Ask("squeue -h -o '%T %N'").find("RUNNING n2") != std::string::npos; }));
   ASSERT_TRUE(Await([&] { return fs::exists(folder_ / "many" / "trials"); }));
   ASSERT_EQ(Sh(fmt::format("sh '{}' lose '{}' n2", kScript, Slurm().string())), 0);
-  // Slurm lets a job of a lost node wait for minutes; the test does not.
+  // Slurm delays a job of a lost node for minutes; this starts it at once.
   const auto is_done = [&] {
     Sh("scontrol update JobId=1 StartTime=now > /dev/null 2>&1");
     return fs::exists(folder_ / "many" / "report.html");

@@ -65,7 +65,7 @@ TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
   GatherTrials(folder_ / "merged", {folder_ / "shard2", folder_ / "shard0", folder_ / "shard1"});
   EXPECT_EQ(StudyFiles(folder_ / "merged"), one);
 
-  // As if killed: one trial is gone, one is cut short.
+  // Simulates kill -9: one trial is missing, one is cut short.
   fs::remove_all(folder_ / "one" / "trials" / plan.trials[0].id);
   WriteFileAtomically(folder_ / "one" / "trials" / plan.trials[2].id / "trial.json", "{\"id\": ");
   const StudySummary again = RunStudy(plan, folder_ / "one", {}, {});
@@ -74,9 +74,8 @@ TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
   EXPECT_EQ(StudyFiles(folder_ / "one"), one);
 }
 
-// A study whose file has changed is, trial for trial and table for table, the study that was never
-// another one.
-TEST_F(StudyTest, AChangedStudyKeepsTheTrialsThatItStillHasAndEndsAsIfItHadBeenSoFromTheFirst) {
+// A changed study gives the same trials and tables as if it had never been different.
+TEST_F(StudyTest, AChangedStudyKeepsItsTrialsAndGivesTheSameTables) {
   RunStudy(Plan(kSmall), folder_ / "run", {}, {});
   const StudyPlan changed = Plan(
       "subjects:\n  - {name: b, set: {subject.random_seed: 2}}\n"
@@ -88,8 +87,8 @@ TEST_F(StudyTest, AChangedStudyKeepsTheTrialsThatItStillHasAndEndsAsIfItHadBeenS
   EXPECT_EQ(on.skipped, 1);  // b with mean
   EXPECT_EQ(on.done, 3);
   EXPECT_EQ(on.left_over, 3);
-  const StudySummary anew = RunStudy(changed, folder_ / "new", {}, {});
-  EXPECT_FALSE(anew.changed);
+  const StudySummary fresh = RunStudy(changed, folder_ / "new", {}, {});
+  EXPECT_FALSE(fresh.changed);
   auto run = StudyFiles(folder_ / "run");
   for (const auto& [name, bytes] : StudyFiles(folder_ / "new")) {
     EXPECT_EQ(run.at(name), bytes) << name;
@@ -97,7 +96,7 @@ TEST_F(StudyTest, AChangedStudyKeepsTheTrialsThatItStillHasAndEndsAsIfItHadBeenS
   EXPECT_EQ(RunStudy(changed, folder_ / "run", {}, {}).skipped, 4);
 }
 
-TEST_F(StudyTest, TrialsThatLackWhatIsKeptNowAreRunAgain) {
+TEST_F(StudyTest, TrialsThatLackKeptFilesRunAgain) {
   const std::string one = "grid: {landmarks.max_distance_mm: [50]}\n";
   const StudyPlan summary = Plan(one), view = Plan(one + "keep: view\n");
   RunStudy(summary, folder_ / "run", {}, {});
@@ -107,7 +106,7 @@ TEST_F(StudyTest, TrialsThatLackWhatIsKeptNowAreRunAgain) {
   EXPECT_EQ(RunStudy(summary, folder_ / "run", {}, {}).skipped, 1);
 }
 
-TEST_F(StudyTest, OnlyWhatIsAskedForRunsAndTheRestFollowsLater) {
+TEST_F(StudyTest, OnlySelectedTrialsRunAndTheOthersCanFollow) {
   const StudyPlan plan = Plan(kSmall);
   const StudySummary part =
       RunStudy(plan, folder_ / "run", {.only = "subject = b and interp = mean"}, {});
@@ -121,18 +120,18 @@ TEST_F(StudyTest, OnlyWhatIsAskedForRunsAndTheRestFollowsLater) {
   EXPECT_EQ(StudyFiles(folder_ / "run"), StudyFiles(folder_ / "whole"));
   EXPECT_THAT(
       WordsOf<InputError>([&] { RunStudy(plan, folder_ / "none", {.only = "subject = x"}, {}); }),
-      HasSubstr("none of the 4 trials is so"));
+      HasSubstr("holds for none of the 4 trials"));
   EXPECT_FALSE(fs::exists(folder_ / "none"));
 }
 
-TEST_F(StudyTest, ADepthStudyTakesNoTrialOfAFaceStudy) {
+TEST_F(StudyTest, ADepthStudySharesNoTrialWithAFaceStudy) {
   const std::string one = "grid: {landmarks.max_distance_mm: [50]}\n";
   const StudyPlan face = Plan(one),
                   depth = Plan(one + "job: depth\nmetric: depth_truth.tips.rms_mm\n");
   EXPECT_NE(face.trials[0].id, depth.trials[0].id);
 }
 
-// Every number of a real result is among those that are known beforehand.
+// Every number of a real result is a metric that is known before the run.
 TEST_F(StudyTest, TheMetricsOfARunAreKnownBeforeIt) {
   for (const auto& [job, text] :
        {std::pair{StudyJob::kFace, ""},
@@ -151,7 +150,7 @@ TEST_F(StudyTest, TheMetricsOfARunAreKnownBeforeIt) {
   }
 }
 
-TEST_F(StudyTest, UnlikeAreasAreSaid) {
+TEST_F(StudyTest, DifferentAreasAreReported) {
   RunStudy(Plan("grid: {region.extent: [face, network]}\n"), folder_ / "unlike", {}, {});
   EXPECT_THAT(StudyFiles(folder_ / "unlike").at("report.html"),
               HasSubstr("were not measured on the same area (face.area_cm2"));
@@ -173,7 +172,7 @@ TEST_F(StudyTest, AFailedTrialIsARowWithItsReason) {
   EXPECT_EQ(RunStudy(plan, folder_ / "run", {.rerun = Rerun::kFailed}, {}).failed, 1);
 }
 
-TEST_F(StudyTest, WhatIsMissingIsCountedAndSaid) {
+TEST_F(StudyTest, MissingTrialsAreCounted) {
   const StudyPlan plan = Plan(kSmall);
   RunStudy(plan, folder_ / "run", {.shard = 1, .shards = 2}, {});
   OutputFolder output(folder_ / "run", WhenNotEmpty::kReplaceFiles);
@@ -183,7 +182,7 @@ TEST_F(StudyTest, WhatIsMissingIsCountedAndSaid) {
   EXPECT_THAT(ReadFileBytes(folder_ / "run" / "report.html"), HasSubstr("too few for a test"));
 }
 
-TEST_F(StudyTest, OfOneTreatmentNoDifferenceIsAsked) {
+TEST_F(StudyTest, AReportOfOneTreatmentHasNoDifferences) {
   RunStudy(Plan("grid: {landmarks.max_distance_mm: [50]}\n"), folder_ / "run", {}, {});
   const std::string report = StudyFiles(folder_ / "run").at("report.html");
   EXPECT_THAT(report, HasSubstr("Further tables"));
@@ -197,7 +196,7 @@ TEST_F(StudyTest, AFolderOfAnotherPlanIsLeftAlone) {
               HasSubstr("holds another study"));
 }
 
-TEST_F(StudyTest, ResultsAreThoseOfSingleRuns) {
+TEST_F(StudyTest, ResultsEqualThoseOfSingleRuns) {
   const StudyPlan plan = Plan(kSmall);
   RunStudy(plan, folder_ / "run", {.jobs = 2}, {});
   const StudyResults results = ReadStudyResults(folder_ / "run");
@@ -207,7 +206,7 @@ TEST_F(StudyTest, ResultsAreThoseOfSingleRuns) {
   }
 }
 
-TEST_F(StudyTest, TwelveFitsOnOneImplicitFaceMakeItOnce) {
+TEST_F(StudyTest, TwelveFitsShareOneImplicitFace) {
   const StudyPlan one = Plan("list: [{fit.plan.schedule: [{level: 0, fraction: 0.05}]}]\n");
   const StudyPlan twelve = Plan(
       "zip: {fit.plan.schedule: [[{level: 0, fraction: 0.1}], [{level: 0, fraction: 0.2}],\n"
@@ -223,7 +222,7 @@ TEST_F(StudyTest, TwelveFitsOnOneImplicitFaceMakeItOnce) {
   EXPECT_GT(RunStudy(other, folder_ / "other", {}, {}).shared_made, alone.shared_made);
 }
 
-TEST(StageCache, MakesEachValueOnceAndForgetsWhatWasAskedForLongestAgo) {
+TEST(StageCache, MakesEachValueOnceAndDropsTheLeastRecentlyUsed) {
   StageCache cache(2);
   int calls = 0;
   const auto get = [&](const std::string& key) {

@@ -6,11 +6,14 @@
 #include <sys/stat.h>
 
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "problems/output/manifest.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {
@@ -19,6 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using Json = nlohmann::json;
+using ::testing::ElementsAre;
+using ::testing::Pair;
 
 class TrialFolders : public ::testing::Test {
  protected:
@@ -28,7 +34,7 @@ class TrialFolders : public ::testing::Test {
     Write("timing.json", "{}");
     WriteTrial({{"id", "a"},
                 {"status", "done"},
-                {"files", HashesOf(From(), {"face.ply", "pictures/front.png"})}});
+                {"files", ListHashes(From(), {"face.ply", "pictures/front.png"})}});
   }
 
   fs::path From() const { return TrialFolder(folder_ / "from", "a"); }
@@ -39,7 +45,7 @@ class TrialFolders : public ::testing::Test {
   }
   void WriteTrial(const nlohmann::ordered_json& json) const { Write("trial.json", json.dump()); }
   std::string Copy() const { return CopyTrial(folder_ / "from", folder_ / "to", "a"); }
-  // Refused, and nothing has come to where it should go.
+  // The copy is refused and writes nothing.
   void ExpectNotTaken(const std::string& words) const {
     EXPECT_THAT(Copy(), HasSubstr(words));
     EXPECT_FALSE(fs::exists(To()));
@@ -48,7 +54,7 @@ class TrialFolders : public ::testing::Test {
   testing::ScratchFolder folder_;
 };
 
-TEST_F(TrialFolders, AWholeTrialIsCopiedWhole) {
+TEST_F(TrialFolders, AWholeTrialIsCopiedCompletely) {
   EXPECT_THAT(Copy(), IsEmpty());
   for (const char* name : {"face.ply", "pictures/front.png", "timing.json", "trial.json"}) {
     EXPECT_EQ(ReadFileBytes(To() / name), ReadFileBytes(From() / name)) << name;
@@ -56,17 +62,17 @@ TEST_F(TrialFolders, AWholeTrialIsCopiedWhole) {
   EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "to/trials"), {}), 1);
 }
 
-TEST_F(TrialFolders, AFileThatIsMissingOrChangedIsFound) {
+TEST_F(TrialFolders, AMissingOrChangedFileIsFound) {
   Write("face.ply", "mesj");
   ExpectNotTaken("face.ply is not what was written");
   fs::remove(From() / "face.ply");
   ExpectNotTaken("face.ply is missing");
 }
 
-TEST_F(TrialFolders, TheManifestOfARunCountsToo) {
+TEST_F(TrialFolders, TheManifestOfARunIsCheckedToo) {
   WriteTrial({{"id", "a"}, {"status", "done"}});
   nlohmann::ordered_json manifest;
-  manifest["outputs"] = HashesOf(From(), {"face.ply"});
+  manifest["outputs"] = ListHashes(From(), {"face.ply"});
   Write("manifest.json", manifest.dump());
   EXPECT_THAT(Copy(), IsEmpty());
   fs::remove_all(To());
@@ -94,7 +100,7 @@ TEST_F(TrialFolders, NoLinkIsFollowedOutOfATrial) {
   ExpectNotTaken("it is a link");
 }
 
-TEST_F(TrialFolders, WhatIsNotWholeIsNotATrial) {
+TEST_F(TrialFolders, AnIncompleteTrialDoesNotExist) {
   for (const char* text : {"", "{", "[]", "{\"id\": \"b\"}", "{\"id\": 1}",
                            "{\"id\": \"a\", \"status\": 3}", "{\"id\": \"a\", \"reason\": []}"}) {
     Write("trial.json", text);
@@ -103,7 +109,7 @@ TEST_F(TrialFolders, WhatIsNotWholeIsNotATrial) {
   }
 }
 
-TEST_F(TrialFolders, WhatABrokenTrialHasLeftIsReplacedAndOtherFilesStay) {
+TEST_F(TrialFolders, FilesOfABrokenTrialAreReplacedAndOtherFilesStay) {
   fs::create_directories(To());
   WriteFileAtomically(To() / "trial.json", "{");
   WriteFileAtomically(To() / "mine.txt", "mine");
@@ -112,15 +118,59 @@ TEST_F(TrialFolders, WhatABrokenTrialHasLeftIsReplacedAndOtherFilesStay) {
   EXPECT_EQ(ReadFileBytes(To() / "mine.txt"), "mine");
 }
 
-TEST_F(TrialFolders, APlanIsOfAStudyOrAnError) {
-  EXPECT_EQ(PlanHashOf(folder_ / "from"), "");
+TEST_F(TrialFolders, AFileThatIsNotAPlanIsAnError) {
+  EXPECT_EQ(ReadPlanHash(folder_ / "from"), "");
   const fs::path file = folder_ / "from/plan.json";
   for (const char* text : {"", "{", "[]", "{}", "{\"hash\": 7}"}) {
     WriteFileAtomically(file, text);
-    EXPECT_THROW(PlanHashOf(folder_ / "from"), IoError) << text;
+    EXPECT_THROW(ReadPlanHash(folder_ / "from"), IoError) << text;
   }
   WriteFileAtomically(file, "{\"hash\": \"h\"}");
-  EXPECT_EQ(PlanHashOf(folder_ / "from"), "h");
+  EXPECT_EQ(ReadPlanHash(folder_ / "from"), "h");
+}
+
+// Collects the same numbers from a JSON tree.
+void AddNumbers(const Json& json, const std::string& path, std::map<std::string, double>& numbers) {
+  if (json.is_number()) {
+    numbers[path] = json.get<double>();
+  } else if (json.is_object()) {
+    for (const auto& [key, value] : json.items()) {
+      AddNumbers(value, path.empty() ? key : path + "." + key, numbers);
+    }
+  }
+}
+
+TEST(TrialNumbers, EqualThoseOfTheTree) {
+  const std::string text = R"({"id": "a1", "status": "done", "axes": {"x": "1", "status": "no"},
+    "result": {"n": 3, "low": -2, "null": null, "text": "x", "flag": true, "face":
+    {"rms_mm": 1.5, "quantiles_mm": [0.5, null, 1e-3], "id": "b"},
+    "fit": {"levels": [{"rms": 3, "deep": {"d": [7]}}, {"rms": 2}], "after": 1}, "last": 4e2},
+    "files": [{"file": "a", "size": 4}], "after": 5})";
+  const auto trial = ReadTrialNumbers(text);
+  ASSERT_TRUE(trial);
+  EXPECT_EQ(trial->id, "a1");
+  EXPECT_EQ(trial->status, "done");
+  std::map<std::string, double> numbers;
+  AddNumbers(Json::parse(text)["result"], "", numbers);
+  EXPECT_EQ(trial->metrics, numbers);
+  EXPECT_EQ(trial->metrics.size(), 5U);
+  EXPECT_THAT(trial->lists,
+              ElementsAre(Pair("face.quantiles_mm", ElementsAre(0.5, ::testing::IsNan(), 1e-3)),
+                          Pair("fit.levels.deep.d", ElementsAre(7)),
+                          Pair("fit.levels.rms", ElementsAre(3, 2))));
+}
+
+TEST(TrialNumbers, AreMissingForATextThatIsNotATrial) {
+  const std::string deep = R"({"id": "a", "result": )" + std::string(kDeepestJson, '[') +
+                           std::string(kDeepestJson, ']') + "}";
+  for (const std::string& text :
+       {std::string(), std::string("[]"), std::string("3"), std::string("null"),
+        std::string("\"id\""), std::string(R"({"id": "a")"), std::string(R"({"id": 1})"),
+        std::string(R"({"id": null})"), std::string(R"({"status": ["done"]})"),
+        std::string(R"({"status": {"a": 1}})"), std::string(R"({"reason": false})"), deep}) {
+    EXPECT_FALSE(ReadTrialNumbers(text)) << text;
+  }
+  EXPECT_EQ(ReadTrialNumbers("{}")->status, "failed");
 }
 
 }  // namespace
