@@ -2,8 +2,8 @@
 // Strict configuration: YAML to option structs and back. Data files (tissue tables, landmarks,
 // networks) are YAML files too, and the same strict reader reads them.
 //
-// How an option struct becomes a reader, a writer, a reference and a schema
-// --------------------------------------------------------------------------
+// From an option struct to a reader, a writer, a reference and a schema
+// ---------------------------------------------------------------------
 // A struct describes its options once, in its `Fields` list (surfaces/base/fields.h):
 //
 //     struct Flat {
@@ -47,8 +47,8 @@
 // only dispatch on the type; the work is in functions without templates, so that a variant of many
 // structs stays cheap to compile.
 //
-// What the reader accepts
-// -----------------------
+// Input that the reader accepts
+// -----------------------------
 // Every field may be left out and then keeps its default; an empty file means all defaults. The
 // reader refuses everything else that is not exactly right: unknown and repeated keys, null where
 // the field is not optional, quoted numbers, whole numbers written 1e3 or 1.0, numbers with a

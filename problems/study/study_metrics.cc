@@ -141,7 +141,7 @@ bool HasPrefix(const std::string& start, const std::set<std::string>& names) {
 }
 
 // Returns true for a metric per landmark, feature, site or region, in a group of metrics that the
-// job has. Which landmarks, features and sites exist depends on the subject.
+// job has. Each subject has its own landmarks, features and sites.
 bool DependsOnSubject(const std::string& metric, const std::set<std::string>& names) {
   constexpr std::array kGroups = {".landmarks.", ".features.", ".sites.", ".feature_distortion.",
                                   ".coverage_90_of."};

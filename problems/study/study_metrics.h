@@ -18,7 +18,7 @@ std::string ComplaintAboutMetric(const std::string& metric, StudyJob job);
 // Returns true if the metric compares with the true skin, so that a subject without one lacks it.
 bool NeedsTrueSkin(const std::string& metric);
 
-// Which values of a metric are better: those at one end, or those nearest to a target.
+// The better values of a metric: those at one end, or those nearest to a target.
 enum class Better { kLower, kHigher, kNearest };
 constexpr auto EnumNames(Better) {
   return std::to_array<std::string_view>({"lower", "higher", "nearest"});
@@ -29,7 +29,7 @@ constexpr auto EnumNames(Better) {
 // coverage_50, _90 and _95, lower for all others.
 Better BetterOf(const std::string& metric);
 
-// Which values of a metric are better, with the target of kNearest.
+// The better values of a metric, with the target of kNearest.
 struct Preference {
   Better better = Better::kLower;
   double target = 0;  // only for kNearest

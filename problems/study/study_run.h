@@ -15,7 +15,7 @@
 
 namespace semblance {
 
-// Which finished trials run again: none; those that failed; also the unusable ones; all.
+// The finished trials that run again: none; those that failed; also the unusable ones; all.
 enum class Rerun { kNothing, kFailed, kUnusable, kAll };
 
 struct StudyRunOptions {
