@@ -17,7 +17,9 @@ namespace {
 // Largest share of the points that may fold or collapse. Outliers and noise reach a few permille.
 constexpr double kMostFaults = 0.02;
 
-[[noreturn]] void Fail(const std::string& what) { throw InputError("parameters: " + what); }
+[[noreturn]] void FailParameters(const std::string& what) {
+  throw InputError("parameters: " + what);
+}
 
 std::string PercentText(double share) { return fmt::format("{:.3g} %", 100 * share); }
 
@@ -52,7 +54,8 @@ std::string WiderRanges(std::span<const Vec2> uv, Ranges ranges) {
 void CheckGiven(std::span<const Vec2> uv, const Ranges& ranges, const PointNames& name_of) {
   for (const auto& [low, high] : ranges) {
     if (!(high > low)) {
-      Fail(fmt::format("the range [{}, {}] is empty; give the lower bound first", low, high));
+      FailParameters(
+          fmt::format("the range [{}, {}] is empty; give the lower bound first", low, high));
     }
   }
   for (std::size_t k = 0; k < uv.size(); ++k) {
@@ -67,7 +70,7 @@ void CheckGiven(std::span<const Vec2> uv, const Ranges& ranges, const PointNames
 
 Parametrisation ParametriseBy(Scan scan, const GivenParameters& given) {
   if (scan.given_uv.empty()) {
-    Fail(
+    FailParameters(
         "type 'given' needs the (u,v) of each point (the columns u and v of a table); give them, "
         "or take 'plane', 'cylinder' or 'mesh'");
   }
@@ -138,7 +141,7 @@ void Normalise(int coordinate, std::vector<Vec2>& uv) {
     high = std::max(high, p[coordinate]);
   }
   if (!(high > low)) {
-    Fail(
+    FailParameters(
         fmt::format("the points have no extent along {}; give other points, or the columns u and v "
                     "with parameters: given",
                     coordinate == 0 ? "u" : "v"));
@@ -165,7 +168,7 @@ Parametrisation Take(CheckedMap checked, ParameterSource source) {
 }
 
 [[noreturn]] void RefusePlanes(const CheckedMap& planes) {
-  Fail(fmt::format(
+  FailParameters(fmt::format(
       "the points fold over the plane: {}; give the columns u and v with parameters: given, or "
       "triangles between the points (a PLY, OBJ, STL or OFF with faces) with parameters: mesh, or, "
       "for a tube, take parameters: cylinder with closure: periodic_u; parameters: {{type: plane, "
@@ -191,7 +194,7 @@ constexpr std::string_view kOtherThanCylinder =
 
 void CheckEnds(const Scan& scan, const CylinderAxis& axis) {
   if (const CylinderEnds ends = FindEnds(scan.positions, axis); ends.Close()) {
-    Fail(fmt::format(
+    FailParameters(fmt::format(
         "the points close at an end of the cylinder, where their angle is not known: half of the "
         "last hundredth are within {:.3g} mm of the axis, half of all points within {:.3g} mm; {}",
         ends.narrower_mm, ends.all_mm, kOtherThanCylinder));
@@ -201,7 +204,7 @@ void CheckEnds(const Scan& scan, const CylinderAxis& axis) {
 Parametrisation ParametriseBy(const Scan& scan, const CylinderParameters& cylinder) {
   CheckedMap best = BestMap(scan, CylindersAround(scan.positions, Vec3(cylinder.axis.data())));
   if (!MayBeTaken(best, cylinder.folds)) {
-    Fail(fmt::format(
+    FailParameters(fmt::format(
         "the points fold over the cylinder, or close at its ends, where their angle is not known: "
         "{}; {}",
         best.looked_at, kOtherThanCylinder));
@@ -214,7 +217,7 @@ Parametrisation ParametriseBy(const Scan& scan, const CylinderParameters& cylind
 
 Parametrisation ParametriseBy(const Scan& scan, const MeshParameters& mesh) {
   if (scan.triangles.empty()) {
-    Fail(
+    FailParameters(
         "type 'mesh' needs triangles between the points; give a PLY, OBJ, STL or OFF with faces "
         "(MeshLab and CloudCompare make them from points), or the columns u and v with parameters: "
         "given");
@@ -227,8 +230,8 @@ Parametrisation ParametriseBy(const Scan& scan, const MeshParameters& mesh) {
   CheckedMap laid{.map = {.how = how, .at = std::move(layout.at)}, .faults = {}, .looked_at = {}};
   laid.faults = FindFaults(scan, laid.map);
   if (laid.faults.folded > kMostFaults) {  // a layout squeezes, which is no fault
-    Fail(fmt::format("{} folds {} of it; take another map (mean_value does not fold)", how,
-                     PercentText(laid.faults.folded)));
+    FailParameters(fmt::format("{} folds {} of it; take another map (mean_value does not fold)",
+                               how, PercentText(laid.faults.folded)));
   }
   return Take(std::move(laid), ParameterSource::kMesh);
 }
@@ -254,17 +257,18 @@ Parametrisation ParametriseBy(Scan scan, const AutoParameters&) {
 
 void CheckScan(const Scan& scan) {
   if (scan.positions.empty()) {
-    Fail("there is no point; give some");
+    FailParameters("there is no point; give some");
   }
   if (!scan.given_uv.empty() && scan.given_uv.size() != scan.positions.size()) {
-    Fail(fmt::format("{} pairs (u,v) for {} points; give one per point, or none",
-                     scan.given_uv.size(), scan.positions.size()));
+    FailParameters(fmt::format("{} pairs (u,v) for {} points; give one per point, or none",
+                               scan.given_uv.size(), scan.positions.size()));
   }
   const auto count = static_cast<std::int64_t>(scan.positions.size());
   for (const Triangle& t : scan.triangles) {
     for (const std::int32_t corner : t) {
       if (corner < 0 || corner >= count) {
-        Fail(fmt::format("a triangle has the corner {}, and there are {} points", corner, count));
+        FailParameters(
+            fmt::format("a triangle has the corner {}, and there are {} points", corner, count));
       }
     }
   }

@@ -203,7 +203,8 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
           {"faults", result.Faults()}};
 }
 
-Json ResultJson(const PointFitOptions& options, const PointSource& source, const PointFit& result) {
+Json FitResultJson(const PointFitOptions& options, const PointSource& source,
+                   const PointFit& result) {
   Json json = FiguresJson(options, source, result);
   if (std::isfinite(result.weighted_rms_mm)) {
     json["weighted_rms_mm"] = result.weighted_rms_mm;
@@ -256,8 +257,8 @@ void WriteAttributes(const PointFit& result, OutputFolder& folder) {
 }
 
 // Lines for the terminal, besides the figures.
-std::vector<std::string> Notes(const PointFitOptions& options, const PointFit& result,
-                               double chord_mm) {
+std::vector<std::string> TerminalNotes(const PointFitOptions& options, const PointFit& result,
+                                       double chord_mm) {
   std::vector<std::string> notes;
   if (std::isfinite(result.weighted_rms_mm)) {
     notes.push_back(
@@ -310,9 +311,9 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
   folder.Write("timing.json", TimingJson(result.times));
   folder.Write(
       "result.json",
-      ResultJson(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
+      FitResultJson(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
           "\n");
-  return Notes(options, result, chord_mm);
+  return TerminalNotes(options, result, chord_mm);
 }
 
 }  // namespace semblance
