@@ -2,7 +2,6 @@
 // The option `weight` that every term has.
 #pragma once
 
-#include "surfaces/base/auto_or.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {

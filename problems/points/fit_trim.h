@@ -9,7 +9,6 @@
 #include <variant>
 
 #include "fitting/plan/fit_result.h"
-#include "surfaces/base/auto_or.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/point_query.h"
 

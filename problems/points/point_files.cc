@@ -16,10 +16,9 @@
 #include <tuple>
 #include <utility>
 
-#include "problems/output/manifest.h"
 #include "problems/points/plain_points.h"
-#include "problems/volumes/gzip_bytes.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 #include "surfaces/base/npy.h"

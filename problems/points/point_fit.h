@@ -23,7 +23,7 @@
 #include "problems/points/join_report.h"
 #include "problems/points/point_table.h"
 #include "problems/points/surface_join.h"
-#include "surfaces/base/auto_or.h"
+#include "surfaces/base/fields.h"
 #include "surfaces/hspline_query/surface_poles.h"
 
 namespace semblance {

@@ -8,8 +8,8 @@
 #include <cstddef>
 #include <utility>
 
-#include "problems/output/manifest.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 

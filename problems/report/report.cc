@@ -12,7 +12,7 @@
 #include "problems/plots/escape_html.h"
 #include "problems/report/report_assets.h"
 #include "surfaces/base/atomic_file.h"
-#include "surfaces/base/base64.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

@@ -21,6 +21,7 @@
 #include "problems/report/scene_json.h"
 #include "problems/report/timing_json.h"
 #include "surfaces/base/csv.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/mesh/mesh_query.h"

@@ -8,8 +8,7 @@
 #include <limits>
 #include <utility>
 
-#include "problems/output/manifest.h"
-#include "surfaces/base/base64.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

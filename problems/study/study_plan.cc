@@ -12,10 +12,10 @@
 #include "problems/config/config_reader.h"
 #include "problems/config/value_filter.h"
 #include "problems/inputs/input_files.h"
-#include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/study/study_metrics.h"
 #include "problems/study/study_rows.h"
+#include "surfaces/base/encoding.h"
 
 namespace semblance {
 namespace {

@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "problems/inputs/input_files.h"
-#include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
+#include "surfaces/base/encoding.h"
 
 namespace semblance {
 namespace {

@@ -12,19 +12,19 @@
 namespace semblance {
 namespace {
 
-// For each new entry of an object the library looks at all others.
-constexpr int kMostEntries = 4000;
+// The library compares each new entry of an object with all others, which takes quadratic time.
+constexpr int kMaxEntries = 4000;
 
 }  // namespace
 
-// Brackets and colons outside of texts, counted before the parser builds a tree of them.
+// Counts brackets and colons outside of texts, before the parser builds a tree.
 void CheckJsonDepth(std::string_view text) {
-  std::vector<int> entries = {0};  // of each list and object that is open
+  std::vector<int> entries = {0};  // count per open list or object
   bool is_in_text = false;
   for (std::size_t k = 0; k < text.size(); ++k) {
     const char c = text[k];
     if (is_in_text) {
-      k += c == '\\' ? 1 : 0;  // what is escaped ends nothing
+      k += c == '\\' ? 1 : 0;  // an escaped quote does not end the text
       is_in_text = c != '"';
     } else if (c == '"') {
       is_in_text = true;
@@ -39,8 +39,8 @@ void CheckJsonDepth(std::string_view text) {
       throw IoError(
           fmt::format("more than {} levels of lists and objects within each other", kDeepestJson));
     }
-    if (entries.back() > kMostEntries) {
-      throw IoError(fmt::format("an object of more than {} entries", kMostEntries));
+    if (entries.back() > kMaxEntries) {
+      throw IoError(fmt::format("an object of more than {} entries", kMaxEntries));
     }
   }
 }
@@ -52,7 +52,7 @@ std::string JsonFault(const std::exception& error) {
 }
 
 nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name) {
-  // The library takes one for the end, and reads nothing behind it.
+  // The library takes a zero byte for the end of the text and ignores the rest.
   if (const std::size_t zero = text.find('\0'); zero != text.npos) {
     throw IoError(fmt::format("{}: this is not JSON: byte {} is zero", name, zero + 1));
   }

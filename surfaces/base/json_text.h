@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Text to JSON, within the depth that a recursion over the tree can stand.
+// Parses JSON with limits on depth and size, so that recursion over the tree cannot overflow the
+// stack.
 #pragma once
 
 #include <exception>
@@ -9,15 +10,16 @@
 
 namespace semblance {
 
-inline constexpr int kDeepestJson = 64;  // levels of lists and objects within each other
+inline constexpr int kDeepestJson = 64;  // nested lists and objects
 
-// Throws IoError for deeper nesting, and for an object of over 4,000 entries; JSON or not.
+// Throws IoError for deeper nesting, and for an object of more than 4,000 entries. The text need
+// not be valid JSON.
 void CheckJsonDepth(std::string_view text);
 
-// Throws IoError, which begins with `name`, for deeper nesting and for what is no JSON.
+// Throws IoError, beginning with `name`, for deeper nesting and for invalid JSON.
 nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name);
 
-// What an exception of the JSON library says, for people: without its own name and number.
+// The message of a JSON library exception, without the exception's own name and number.
 std::string JsonFault(const std::exception& error);
 
 }  // namespace semblance

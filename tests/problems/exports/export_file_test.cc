@@ -13,7 +13,7 @@
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/run_folder.h"
 #include "surfaces/base/atomic_file.h"
-#include "surfaces/base/base64.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"

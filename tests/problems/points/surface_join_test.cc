@@ -5,9 +5,9 @@
 #include <gtest/gtest.h>
 
 #include "problems/config/config.h"
-#include "problems/output/manifest.h"
 #include "problems/points/point_fit.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "tests/testing/scratch_file.h"

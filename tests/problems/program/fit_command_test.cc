@@ -12,10 +12,10 @@
 #include <vector>
 
 #include "problems/output/given_files.h"
-#include "problems/output/manifest.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/base/base64.h"
+#include "surfaces/base/encoding.h"
 
 #include <gtest/gtest.h>
 
