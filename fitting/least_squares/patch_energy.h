@@ -6,7 +6,7 @@
 #include <array>
 
 #include "fitting/least_squares/bending_metric.h"
-#include "surfaces/hspline/control_net.h"
+#include "surfaces/hspline/bspline.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {

@@ -9,7 +9,7 @@
 #include "fitting/solve/level_summary.h"
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
-#include "surfaces/hspline/control_net.h"
+#include "surfaces/hspline/bspline.h"
 
 namespace semblance {
 

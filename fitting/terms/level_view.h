@@ -14,7 +14,7 @@
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
 #include "fitting/space/spline_element.h"
-#include "surfaces/hspline/control_net.h"
+#include "surfaces/hspline/bspline.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {

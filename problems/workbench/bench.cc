@@ -22,7 +22,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
-#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {

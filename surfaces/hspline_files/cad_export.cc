@@ -26,7 +26,7 @@
 #include <sstream>
 
 #include "surfaces/base/error.h"
-#include "surfaces/hspline/patch_regions.h"
+#include "surfaces/hspline/patch_tree.h"
 
 namespace semblance {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "surfaces/hspline/control_net.h"
+#include "surfaces/hspline/bspline.h"
 
 namespace semblance::testing {
 

@@ -5,8 +5,8 @@
 
 #include <algorithm>
 
+#include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_files/cad_export.h"
-#include "surfaces/hspline_files/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_files/surface_export.h"
 #include "surfaces/hspline_query/adaptive_tessellation.h"

@@ -20,7 +20,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/random.h"
-#include "surfaces/hspline/patch_regions.h"
+#include "surfaces/hspline/patch_tree.h"
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 

@@ -79,7 +79,7 @@ TEST(HSplineJson, RefusesEveryOtherText) {
       HSplineFromJson(text, "a.json");
       ADD_FAILURE() << "accepted; expected: " << words;
     } catch (const IoError& e) {
-      EXPECT_THAT(e.what(), ::testing::StartsWith("a.json: not an H-spline that can be read: "));
+      EXPECT_THAT(e.what(), ::testing::StartsWith("a.json: not a readable H-spline: "));
       EXPECT_THAT(e.what(), ::testing::HasSubstr(words));
     }
   }
@@ -132,10 +132,48 @@ TEST_F(HSplineFile, ErrorsNameTheFile) {
   };
   EXPECT_THAT(message(), HasSubstr("broken.json: no such file"));
   WriteFileAtomically(path, "{\"format\": \"semblance-hspline\"");
-  EXPECT_THAT(message(), HasSubstr("broken.json: not an H-spline that can be read"));
+  EXPECT_THAT(message(), HasSubstr("broken.json: not a readable H-spline"));
   EXPECT_THROW(WriteHSpline(folder_ / "absent" / "x.json",
                             RandomSurface({.patches_u = 4, .patches_v = 4, .max_level = 1}, 1)),
                IoError);
+}
+
+TEST(FeatureJson, ALibraryKeepsEveryBit) {
+  const ScratchFolder folder;
+  const HSplineShape shape{.patches_u = 4, .patches_v = 5, .max_level = 3};
+  const Feature nose = ExtractFeature(RandomSurface(shape, 7), "nose");
+  const Feature ear = ExtractFeature(RandomSurface(shape, 8), "ear_l");
+  StoreFeature(folder / "library", nose);
+  StoreFeature(folder / "library", ear);
+  EXPECT_EQ(ReadFeatureLibrary(folder / "library"),
+            (std::map<std::string, Feature>{{"ear_l", ear}, {"nose", nose}}));
+}
+
+TEST(FeatureJson, FilesThatAreNotFeaturesAreNamedWithTheirFault) {
+  const ScratchFolder folder;
+  const std::string good = FeatureToJson(
+      ExtractFeature(RandomSurface({.patches_u = 4, .patches_v = 4, .max_level = 1}, 1), "nose"));
+  const auto complaint = [](const std::string& text) -> std::string {
+    try {
+      FeatureFromJson(text, "nose.json");
+    } catch (const IoError& e) {
+      return e.what();
+    }
+    return "accepted";
+  };
+  const auto with = [&](const std::string& old, const std::string& text) {
+    std::string copy = good;
+    return copy.replace(copy.find(old), old.size(), text);
+  };
+  EXPECT_EQ(complaint(good), "accepted");
+  EXPECT_THAT(complaint("{"), HasSubstr("nose.json"));
+  EXPECT_THAT(complaint(with("\"version\":1", "\"version\":2")), HasSubstr("version 2"));
+  EXPECT_THAT(complaint(with("\"units\"", "\"unit\"")), HasSubstr("unknown entry 'unit'"));
+  EXPECT_THAT(complaint(with("\"offsets\":[[1,", "\"offsets\":[[7,")), HasSubstr("on level 7"));
+  EXPECT_THAT(complaint(with("\"nose\"", "\"a/b\"")), HasSubstr("not a name"));
+  WriteFileAtomically(folder / "ear.json", good);
+  EXPECT_THROW(ReadFeatureLibrary(folder.Path()), IoError);
+  EXPECT_THROW(ReadFeatureLibrary(folder / "missing"), IoError);
 }
 
 }  // namespace

@@ -1,32 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline/feature.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
-#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/json_text.h"
-#include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {
 namespace {
-
-constexpr std::string_view kFeatureFormat = "semblance-feature";
-constexpr int kFeatureVersion = 1;
-
-void CheckName(const std::string& name) {
-  const auto allowed = [](unsigned char c) {
-    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
-           c == '_';
-  };
-  if (name.empty() || !std::all_of(name.begin(), name.end(), allowed)) {
-    throw InputError(fmt::format(
-        "feature: '{}' is not a name; use letters, digits, '-' and '_', at least one", name));
-  }
-}
 
 bool Holds(double lowest, double highest, double x) {
   return lowest <= highest ? x >= lowest && x <= highest : x >= lowest || x <= highest;
@@ -48,32 +31,7 @@ void CheckFits(const Feature& feature, const HSplineShape& shape, const std::str
   }
 }
 
-void CheckVertices(const Feature& feature) {
-  const HSplineShape& shape = feature.shape;
-  for (const auto& [vertex, offset] : feature.offsets) {
-    if (vertex.level < 1 || vertex.level > std::min(shape.max_level, 8) || vertex.i < 0 ||
-        vertex.i >= shape.Columns(vertex.level) || vertex.j < 0 ||
-        vertex.j >= shape.Rows(vertex.level) || !offset.allFinite()) {
-      throw IoError(fmt::format("there is no vertex ({}, {}) with an offset on level {}", vertex.i,
-                                vertex.j, vertex.level));
-    }
-  }
-}
-
-Feature ParsedFeature(const json_parts::Json& json) {
-  json_parts::RequireKeys(json, {"format", "version", "name", "units", "patches", "max_level",
-                                 "closure", "offset_reference", "offsets"});
-  json_parts::RequireFormat(json, kFeatureFormat, kFeatureVersion);
-  Feature feature;
-  feature.name = json.at("name").get<std::string>();
-  feature.shape = json_parts::ShapeFromJson(json);
-  feature.offsets = json_parts::OffsetsFromJson(json);
-  CheckName(feature.name);
-  CheckVertices(feature);
-  return feature;
-}
-
-// One outside 0..1 is noted.
+// Adds a warning for a weight outside 0..1.
 void CheckWeight(const Feature& feature, double weight, std::vector<std::string>& warnings) {
   if (!std::isfinite(weight)) {
     throw InputError(
@@ -111,9 +69,20 @@ void CheckOffsets(const Feature& blend) {
 
 }  // namespace
 
+void CheckFeatureName(const std::string& name) {
+  const auto allowed = [](unsigned char c) {
+    return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-' ||
+           c == '_';
+  };
+  if (name.empty() || !std::all_of(name.begin(), name.end(), allowed)) {
+    throw InputError(fmt::format(
+        "feature: '{}' is not a name; use letters, digits, '-' and '_', at least one", name));
+  }
+}
+
 Feature ExtractFeature(const HSplineSurface& surface, std::string name,
                        const FeatureRegion& region) {
-  CheckName(name);
+  CheckFeatureName(name);
   Feature feature{std::move(name), surface.shape(), {}};
   const bool has_rows = surface.shape().ClosedV() || region.lowest_v <= region.highest_v;
   for (const auto& [vertex, offset] : surface.Offsets()) {
@@ -129,7 +98,7 @@ Feature ExtractFeature(const HSplineSurface& surface, std::string name,
 
 Feature ExtractFeature(const HSplineSurface& surface, std::string name,
                        std::span<const VertexId> vertices) {
-  CheckName(name);
+  CheckFeatureName(name);
   Feature feature{std::move(name), surface.shape(), {}};
   for (const VertexId& vertex : vertices) {
     if (const std::optional<Vec3> offset = surface.Offset(vertex)) {
@@ -153,13 +122,9 @@ void RestoreFeature(const Feature& feature, std::span<const VertexId> vertices,
   surface.SetOffsets(offsets);
 }
 
-Feature ReadFeature(const std::filesystem::path& path) {
-  return FeatureFromJson(ReadFileBytes(path), path.string());
-}
-
 FeatureBlend BlendFeatures(std::string name, std::span<const Feature> features,
                            std::span<const double> weights) {
-  CheckName(name);
+  CheckFeatureName(name);
   if (features.empty() || features.size() != weights.size()) {
     throw InputError(fmt::format(
         "feature {}: {} features and {} weights; at least one feature and one weight for each are "
@@ -182,70 +147,14 @@ Feature MirrorFeature(const Feature& feature) {
   const HSplineShape& shape = feature.shape;
   Feature mirrored{feature.name, shape, {}};
   for (const auto& [vertex, offset] : feature.offsets) {
-    const int knot = shape.PatchesU(vertex.level) + 2 - vertex.i;  // of 1 - u
+    const int knot = shape.PatchesU(vertex.level) + 2 - vertex.i;  // knot of 1 - u
     const int i = shape.ClosedU() ? knot % shape.Columns(vertex.level) : knot;
-    // In the mirrored frame the u-tangent runs the other way, the two other axes are the mirrored
-    // ones: there too only the first component turns round.
+    // Mirroring reverses the frame's u-tangent and mirrors its two other axes. Hence the first
+    // component of the offset changes its sign, and the others stay.
     mirrored.offsets.emplace(VertexId{vertex.level, i, vertex.j},
                              Vec3(-offset.x(), offset.y(), offset.z()));
   }
   return mirrored;
-}
-
-std::string FeatureToJson(const Feature& feature) {
-  json_parts::Json json;
-  json["format"] = kFeatureFormat;
-  json["version"] = kFeatureVersion;
-  json["name"] = feature.name;
-  json["units"] = "mm";
-  json_parts::ShapeToJson(feature.shape, json);
-  json["offsets"] = json_parts::OffsetsToJson(feature.offsets);
-  return json.dump() + "\n";
-}
-
-Feature FeatureFromJson(std::string_view text, const std::string& source) {
-  try {
-    return ParsedFeature(json_parts::ParseWithoutRepeats(text));
-  } catch (const nlohmann::json::exception& e) {
-    throw IoError(fmt::format("{}: not a feature that can be read: {}", source, JsonFault(e)));
-  } catch (const Error& e) {
-    throw IoError(fmt::format("{}: not a feature that can be read: {}", source, e.what()));
-  }
-}
-
-std::filesystem::path StoreFeature(const std::filesystem::path& folder, const Feature& feature) {
-  CheckName(feature.name);
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) {
-    throw IoError(
-        fmt::format("{}: the folder cannot be created: {}", folder.string(), error.message()));
-  }
-  const std::filesystem::path path = folder / fmt::format("{}.json", feature.name);
-  WriteFileAtomically(path, FeatureToJson(feature));
-  return path;
-}
-
-std::map<std::string, Feature> ReadFeatureLibrary(const std::filesystem::path& folder) {
-  std::error_code error;
-  std::map<std::string, Feature> library;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    const std::filesystem::path& path = entry.path();
-    if (path.extension() != ".json") {
-      continue;
-    }
-    Feature feature = ReadFeature(path);
-    if (feature.name != path.stem()) {
-      throw IoError(fmt::format("{}: it holds the feature {}; name the file {}.json", path.string(),
-                                feature.name, feature.name));
-    }
-    library.emplace(feature.name, std::move(feature));
-  }
-  if (error) {
-    throw IoError(
-        fmt::format("{}: no library that can be read: {}", folder.string(), error.message()));
-  }
-  return library;
 }
 
 }  // namespace semblance

@@ -1,13 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline/feature.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
-#include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -15,7 +13,6 @@ namespace {
 
 using ::testing::HasSubstr;
 using testing::RandomSurface;
-using testing::ScratchFolder;
 using testing::SmoothSurface;
 
 // Level 0 seen in the mirror: (u,v) -> (1 - u, v), x -> -x.
@@ -130,15 +127,6 @@ TEST_P(FeatureLaws, AMirroredFeatureOnTheMirroredFaceIsTheFaceInTheMirror) {
   }
 }
 
-TEST_P(FeatureLaws, ALibraryKeepsEveryBit) {
-  const ScratchFolder folder;
-  const Feature nose = ExtractFeature(Face(7), "nose"), ear = ExtractFeature(Face(8), "ear_l");
-  StoreFeature(folder / "library", nose);
-  StoreFeature(folder / "library", ear);
-  EXPECT_EQ(ReadFeatureLibrary(folder / "library"),
-            (std::map<std::string, Feature>{{"ear_l", ear}, {"nose", nose}}));
-}
-
 INSTANTIATE_TEST_SUITE_P(
     Shapes, FeatureLaws,
     ::testing::Values(
@@ -163,33 +151,6 @@ TEST(Feature, WhatDoesNotFitIsRefusedAndNothingChanges) {
   EXPECT_THROW(BlendFeatures("mix", both, std::vector<double>{1}), InputError);
   EXPECT_THROW(BlendFeatures("mix", {&feature, 1}, std::vector<double>{kNaN}), InputError);
   EXPECT_THROW(ExtractFeature(other, "../nose"), InputError);
-}
-
-TEST(Feature, FilesThatAreNotFeaturesAreNamedWithTheirFault) {
-  const ScratchFolder folder;
-  const std::string good = FeatureToJson(
-      ExtractFeature(RandomSurface({.patches_u = 4, .patches_v = 4, .max_level = 1}, 1), "nose"));
-  const auto complaint = [](const std::string& text) -> std::string {
-    try {
-      FeatureFromJson(text, "nose.json");
-    } catch (const IoError& e) {
-      return e.what();
-    }
-    return "accepted";
-  };
-  const auto with = [&](const std::string& old, const std::string& text) {
-    std::string copy = good;
-    return copy.replace(copy.find(old), old.size(), text);
-  };
-  EXPECT_EQ(complaint(good), "accepted");
-  EXPECT_THAT(complaint("{"), HasSubstr("nose.json"));
-  EXPECT_THAT(complaint(with("\"version\":1", "\"version\":2")), HasSubstr("version 2"));
-  EXPECT_THAT(complaint(with("\"units\"", "\"unit\"")), HasSubstr("unknown entry 'unit'"));
-  EXPECT_THAT(complaint(with("\"offsets\":[[1,", "\"offsets\":[[7,")), HasSubstr("on level 7"));
-  EXPECT_THAT(complaint(with("\"nose\"", "\"a/b\"")), HasSubstr("not a name"));
-  WriteFileAtomically(folder / "ear.json", good);
-  EXPECT_THROW(ReadFeatureLibrary(folder.Path()), IoError);
-  EXPECT_THROW(ReadFeatureLibrary(folder / "missing"), IoError);
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/hspline/patch_regions.h"
+#include "surfaces/hspline/patch_tree.h"
 
 #include <gtest/gtest.h>
 
