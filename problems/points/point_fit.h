@@ -24,7 +24,7 @@
 #include "problems/points/point_table.h"
 #include "problems/points/surface_join.h"
 #include "surfaces/base/fields.h"
-#include "surfaces/hspline_query/surface_poles.h"
+#include "surfaces/hspline_query/tessellate.h"
 
 namespace semblance {
 

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <utility>
 
@@ -255,6 +256,30 @@ std::size_t HSplineSurface::Bytes() const {
     bytes += level.influenced.Bytes() + level.net.Bytes();
   }
   return bytes;
+}
+
+std::optional<SurfaceCurvature> CurvatureAt(const HSplineSurface& surface, const Vec2& uv) {
+  const SurfaceFrame frame = surface.Frame(uv);
+  if (!frame.regular) {
+    return std::nullopt;
+  }
+  const SecondDerivatives second = surface.Second(uv);
+  const Vec3 normal = frame.Normal();
+  Eigen::Matrix2d bend;  // the second fundamental form
+  bend << normal.dot(second.duu), normal.dot(second.duv), normal.dot(second.duv),
+      normal.dot(second.dvv);
+  // Steps in (u,v) along the frame's first two axes t and s, since du = a t and dv = b t + c s.
+  const double a = frame.axes.col(0).dot(frame.du), b = frame.axes.col(0).dot(frame.dv),
+               c = frame.axes.col(1).dot(frame.dv);
+  Eigen::Matrix2d steps;
+  steps << 1 / a, -b / (a * c), 0, 1 / c;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(steps.transpose() * bend * steps);
+  SurfaceCurvature curvature;
+  curvature.smallest_per_mm = solver.eigenvalues()[0];
+  curvature.largest_per_mm = solver.eigenvalues()[1];
+  curvature.largest_direction = frame.axes.leftCols<2>() * solver.eigenvectors().col(1);
+  curvature.smallest_direction = normal.cross(curvature.largest_direction);
+  return curvature;
 }
 
 }  // namespace semblance

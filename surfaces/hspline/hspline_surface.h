@@ -116,4 +116,20 @@ class HSplineSurface {
   std::vector<Level> levels_;         // levels above 0 follow from offsets_
 };
 
+// The principal curvatures at a point, in 1/mm. A curvature is positive where the surface bends
+// towards its normal (du x dv); a ball with outward normals has principal curvatures -1 / radius.
+struct SurfaceCurvature {
+  double largest_per_mm = kNaN;  // principal curvatures
+  double smallest_per_mm = kNaN;
+  Vec3 largest_direction = Vec3::Constant(kNaN);   // unit tangents, perpendicular; together with
+  Vec3 smallest_direction = Vec3::Constant(kNaN);  // the normal they are right-handed
+
+  double MeanPerMm() const { return (largest_per_mm + smallest_per_mm) / 2; }
+  double GaussianPerMm2() const { return largest_per_mm * smallest_per_mm; }
+};
+
+// Computes the curvatures at uv (as in PatchPointAt) from the first and second fundamental forms.
+// Empty if the frame is not regular. Throws InputError for a (u,v) that is not finite.
+std::optional<SurfaceCurvature> CurvatureAt(const HSplineSurface& surface, const Vec2& uv);
+
 }  // namespace semblance

@@ -14,13 +14,13 @@
 
 namespace semblance {
 
-std::array<DomainCell, 4> ChildrenOf(const DomainCell& c) {
+std::array<DomainCell, 4> Children(const DomainCell& c) {
   return {DomainCell{c.level + 1, 2 * c.i, 2 * c.j}, DomainCell{c.level + 1, 2 * c.i + 1, 2 * c.j},
           DomainCell{c.level + 1, 2 * c.i, 2 * c.j + 1},
           DomainCell{c.level + 1, 2 * c.i + 1, 2 * c.j + 1}};
 }
 
-// The derivatives are convex sums of the vertices' second differences.
+// The second derivatives are convex combinations of the control vertices' second differences.
 double ChordBound(const HSplineSurface& surface, const DomainCell& cell) {
   const int level = std::min(cell.level, surface.shape().max_level), finer = cell.level - level;
   const std::array<Vec3, 16> p = surface.PatchVertices({level, cell.i >> finer, cell.j >> finer});
@@ -43,11 +43,12 @@ namespace {
 
 [[noreturn]] void TooFine(double chord_mm) {
   throw InputError(fmt::format(
-      "tessellation: a chord error of {} mm needs too many triangles; allow more", chord_mm));
+      "tessellation: a chord error of {} mm needs too many triangles; allow a larger one",
+      chord_mm));
 }
 
-// Into how many cells a cell is split for its own sake; infinite where they would be too small.
-// Beyond the finest level each split quarters the bound, so they need not be made to be counted.
+// Counts the cells into which a cell must be split; infinite if they would be too small. Beyond the
+// finest level each split quarters the bound, so that the count needs no actual cells.
 double CellsWithin(const HSplineSurface& surface, const DomainCell& cell, double chord_mm) {
   const double bound = ChordBound(surface, cell);
   if (bound <= chord_mm) {
@@ -59,7 +60,7 @@ double CellsWithin(const HSplineSurface& surface, const DomainCell& cell, double
                                               : std::ldexp(1, 2 * static_cast<int>(splits));
   }
   double count = 0;
-  for (const DomainCell& child : ChildrenOf(cell)) {
+  for (const DomainCell& child : Children(cell)) {
     count += CellsWithin(surface, child, chord_mm);
   }
   return count;
@@ -74,12 +75,12 @@ void SplitToChord(const HSplineSurface& surface, const DomainCell& cell, double 
   if (cell.level == kDeepestCell) {
     TooFine(chord_mm);
   }
-  for (const DomainCell& child : ChildrenOf(cell)) {
+  for (const DomainCell& child : Children(cell)) {
     SplitToChord(surface, child, chord_mm, cells);
   }
 }
 
-// Splits the cell that covers `fine`, if one does, until it is coarser by at most one level.
+// Splits the cell that covers `fine`, if any, until it is coarser by at most one level.
 void RefineAt(const DomainCell& fine, std::set<DomainCell>& cells, std::vector<DomainCell>& open) {
   for (int up = 0; up <= fine.level; ++up) {
     const DomainCell cell{fine.level - up, fine.i >> up, fine.j >> up};
@@ -87,7 +88,7 @@ void RefineAt(const DomainCell& fine, std::set<DomainCell>& cells, std::vector<D
       return;
     }
     if (up >= 2 && cells.erase(cell) > 0) {
-      for (const DomainCell& child : ChildrenOf(cell)) {
+      for (const DomainCell& child : Children(cell)) {
         cells.insert(child);
         open.push_back(child);
       }
@@ -111,7 +112,7 @@ double CellsToChord(const HSplineSurface& surface, double chord_mm) {
 std::set<DomainCell> CellsWithinChord(const HSplineSurface& surface, double chord_mm) {
   if (!(chord_mm > 0) || !std::isfinite(chord_mm)) {
     throw InputError(fmt::format(
-        "tessellation: a chord error of {} mm; it must be above 0 and finite", chord_mm));
+        "tessellation: the chord error is {} mm; it must be above 0 and finite", chord_mm));
   }
   if (!(CellsToChord(surface, chord_mm) <= kMostCells)) {
     TooFine(chord_mm);
@@ -130,7 +131,7 @@ void BalanceCells(const HSplineShape& shape, std::set<DomainCell>& cells) {
     const DomainCell cell = open.back();
     open.pop_back();
     if (!cells.contains(cell)) {
-      continue;  // split since
+      continue;  // already split
     }
     for (const auto& [i, j] : {std::pair{cell.i - 1, cell.j}, std::pair{cell.i + 1, cell.j},
                                std::pair{cell.i, cell.j - 1}, std::pair{cell.i, cell.j + 1}}) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The domain of a surface as a quadtree of cells, as deep as the surface's bends ask for.
+// Divides the domain of a surface into a quadtree of cells within a chord error.
 #pragma once
 
 #include <array>
@@ -9,31 +9,32 @@
 
 namespace semblance {
 
-// As a patch, but of any level: deeper than the surface's finest one too.
+// A cell is like a patch, but its level may exceed the surface's finest level.
 using DomainCell = PatchId;
 
 inline constexpr int kDeepestCell = 16;    // level of the smallest cells
-inline constexpr double kMostCells = 1e7;  // of one surface
+inline constexpr double kMostCells = 1e7;  // per surface; bounds memory
 
-// The quarters of a cell.
-std::array<DomainCell, 4> ChildrenOf(const DomainCell& cell);
+// The four quarters of a cell.
+std::array<DomainCell, 4> Children(const DomainCell& cell);
 
-// How far a triangle with its corners on the surface, within a cell, can be from the surface's
-// point of the same (u,v), in mm: an eighth of h_u^2 |S_uu| + 2 h_u h_v |S_uv| + h_v^2 |S_vv|, each
-// the largest in the cell (Filip et al. 1986), bounded by second differences of the vertices.
+// Bounds the distance, in mm, between a triangle within a cell, with its corners on the surface,
+// and the surface's point of the same (u,v): (h_u^2 |S_uu| + 2 h_u h_v |S_uv| + h_v^2 |S_vv|) / 8,
+// where each norm is the largest in the cell (Filip et al. 1986) and is bounded by second
+// differences of the control vertices.
 double ChordBound(const HSplineSurface& surface, const DomainCell& cell);
 
-// How many cells keep the chord (> 0): a lower bound of those that are triangulated, as neighbours
-// may have to be split too. Infinite where cells would be smaller than a double can tell.
+// The number of cells within the chord error chord_mm (> 0), before balancing, which may split
+// more. Infinite if cells beyond kDeepestCell would be needed.
 double CellsToChord(const HSplineSurface& surface, double chord_mm);
 
-// The largest cells that cover the domain, each within a patch and with a chord bound of at most
+// Covers the domain with the largest cells that lie within a patch and whose ChordBound is at most
 // chord_mm. Throws InputError for a chord that is not positive and finite, or that needs more than
-// kMostCells; these are counted before any is made.
+// kMostCells. The cells are counted before any is created.
 std::set<DomainCell> CellsWithinChord(const HSplineSurface& surface, double chord_mm);
 
-// Splits cells that cover the domain until neighbours differ by one level at most, across the seam
-// of a closed surface too.
+// Splits cells that cover the domain until neighbours differ by at most one level, also across
+// seams.
 void BalanceCells(const HSplineShape& shape, std::set<DomainCell>& cells);
 
 }  // namespace semblance

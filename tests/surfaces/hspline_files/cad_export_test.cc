@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // STEP and IGES are read back by OpenCASCADE and compared at random (u,v).
-#include "surfaces/hspline_files/cad_export.h"
+#include "surfaces/hspline_files/face_export.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/hspline_files/surface_export.h"
+#include "surfaces/hspline_files/face_export.h"
 
 #include <gtest/gtest.h>
 

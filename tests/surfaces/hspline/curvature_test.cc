@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/hspline_query/curvature.h"
+#include "surfaces/hspline/hspline_surface.h"
 
 #include <gtest/gtest.h>
 
