@@ -103,7 +103,7 @@ SEMBLANCE_INLINE N SquareRoot(const N& a) {
 
 // Returns square^(-power / 2). whole: the power if it is an integer, else -1.
 template <class N>
-SEMBLANCE_INLINE N InversePowerOf(const N& square, double power, int whole) {
+SEMBLANCE_INLINE N InversePowerFromSquare(const N& square, double power, int whole) {
   if (whole < 0) {
     double result[kLaneCount<N>];
     std::memcpy(result, &square, sizeof(square));

@@ -37,10 +37,10 @@ double Emission(const Emitting& t, const Vec3& p, const Falloff& falloff) {
   }
   if (height < t.advance_mm) {
     const bool over = std::abs(distance - (t.advance_mm - height)) < 1e-9;
-    return over ? kMostEmission : 0;
+    return over ? kMaxEmission : 0;
   }
   const double emission = t.gain * std::pow(std::max(distance, t.floor_mm), -falloff.power);
-  return emission < falloff.cut ? 0 : std::min(emission, kMostEmission);
+  return emission < falloff.cut ? 0 : std::min(emission, kMaxEmission);
 }
 
 class DistanceKernelTest : public ::testing::TestWithParam<Falloff> {};
@@ -65,7 +65,7 @@ TEST_P(DistanceKernelTest, EachLaneIsTheThesisAndTheSumIsTheLanes) {
       emission[lane] = EmitByDistance(lanes, lane, p, GetParam());
     }
     const std::vector<DistanceEmitterLanes> one = {lanes};
-    const std::vector<ReachBall> reaches = ReachBallsOf(one, GetParam());
+    const std::vector<ReachBall> reaches = MakeReachBalls(one, GetParam());
     const double sum = ((emission[0] + emission[1]) + (emission[2] + emission[3])) +
                        ((emission[4] + emission[5]) + (emission[6] + emission[7]));
     std::int64_t reaching = 0;

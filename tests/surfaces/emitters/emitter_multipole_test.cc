@@ -92,7 +92,7 @@ TEST_P(EmitterMultipoleTest, ErrsByNoMoreThanItsBound) {
     const int used = 1 + n % MultipoleLanes::kLanes;
     for (int lane = 0; lane < used; ++lane) {
       const std::vector<EmitterTriangle> part = Sheet(random, 1 + n % 3, bumps, sloped);
-      lanes[0].Set(lane, MultipoleOf(part, decay), power);
+      lanes[0].Set(lane, MakeMultipole(part, decay), power);
       sheet.insert(sheet.end(), part.begin(), part.end());
     }
     const Vec3 center = random.Uniform(5, 40) * random.InBox(-1, 1).normalized(),
@@ -120,7 +120,7 @@ TEST_P(EmitterMultipoleTest, ErrsByNoMoreThanItsBound) {
 TEST(EmitterMultipole, BoundsGrowTowardsTheEmitters) {
   Random random(18);
   MultipoleLanes lanes;
-  lanes.Set(0, MultipoleOf(Sheet(random, 4, 0.1, false), 6), 9);
+  lanes.Set(0, MakeMultipole(Sheet(random, 4, 0.1, false), 6), 9);
   double last = 0;
   for (const double height : {40.0, 20.0, 10.0, 7.0}) {
     const double bound = lanes.ErrorInBox({1, 2, height}, Vec3::Constant(0.5), 9);

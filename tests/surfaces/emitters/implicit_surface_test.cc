@@ -179,7 +179,7 @@ void ExpectEmissionByParts(const FlatEmitter& emitter, const Vec3& depth_mm, dou
     const double emission = EmissionByParts(triangle, depth_mm, emitter.decay, p);
     EXPECT_NEAR((surface.Value(p) + 1) / emission, 1, within)
         << emitter.decay << ": " << p.transpose();
-    EXPECT_NEAR(surface.SumOf(all, p) / emission, 1, within) << p.transpose();
+    EXPECT_NEAR(surface.SumEmissions(all, p) / emission, 1, within) << p.transpose();
   }
 }
 
@@ -244,7 +244,7 @@ TEST(ThesisEmitter, TheBoxOfInfluenceReachesToWhere500EmittersWouldMakeASurface)
     const Box3 box = surface.InfluenceBox(0, 500);
     EXPECT_NEAR((box.min() - Vec3(-reach_mm, -reach_mm, -reach_mm)).norm(), 0, 1e-5) << decay;
     EXPECT_NEAR((box.max() - Vec3(6 + reach_mm, 3 + reach_mm, reach_mm)).norm(), 0, 1e-5);
-    EXPECT_NEAR(surface.SumOf(only, {1, 1, box.max().z()}), 1.0 / 500, 1e-9);
+    EXPECT_NEAR(surface.SumEmissions(only, {1, 1, box.max().z()}), 1.0 / 500, 1e-9);
   }
 }
 
@@ -257,7 +257,8 @@ TEST(SplitEmitter, TheBoxOfInfluenceIsAroundTheMovedTriangleAndItsPrism) {
   const double reach_mm = 0.7 * 28.172691;
   EXPECT_NEAR((box.min() - Vec3(-reach_mm, -reach_mm, -reach_mm)).norm(), 0, 1e-5);
   EXPECT_NEAR((box.max() - Vec3(6 + reach_mm, 3 + reach_mm, 3 + reach_mm)).norm(), 0, 1e-5);
-  EXPECT_NEAR(surface.SumOf(std::vector<std::int32_t>{0}, {1, 1, box.max().z()}), 1.0 / 500, 1e-9);
+  EXPECT_NEAR(surface.SumEmissions(std::vector<std::int32_t>{0}, {1, 1, box.max().z()}), 1.0 / 500,
+              1e-9);
 }
 
 TEST(SplitEmitter, WithoutSplitItIsTheThesisEmitter) {

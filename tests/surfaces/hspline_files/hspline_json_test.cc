@@ -13,6 +13,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -21,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using testing::RandomSurface;
+using testing::ScratchFolder;
 
 const HSplineShape kShape{
     .patches_u = 4, .patches_v = 5, .max_level = 2, .closure = Closure::kPeriodicU};

@@ -166,12 +166,12 @@ class Bounds : public ::testing::TestWithParam<Emitter> {
     double least_at_corner = std::numeric_limits<double>::infinity();
     for (int c = 0; c < 8; ++c) {
       const Vec3 corner = box.corner(static_cast<Box3::CornerType>(c));
-      least_at_corner = std::min(least_at_corner, surface.SumOf({&only, 1}, corner));
+      least_at_corner = std::min(least_at_corner, surface.SumEmissions({&only, 1}, corner));
     }
     for (int n = 0; n < 200; ++n) {
       const Vec3 share = random.InBox(-0.2, 1.2).cwiseMax(0).cwiseMin(1);  // corners and faces too
       const Vec3 p = box.min() + share.cwiseProduct(box.sizes());
-      const double emission = surface.SumOf({&only, 1}, p);
+      const double emission = surface.SumEmissions({&only, 1}, p);
       EXPECT_LE(bounds.least, emission) << p.transpose();
       EXPECT_GE(bounds.most, emission) << p.transpose();
       if (bounds.least_at_corner) {

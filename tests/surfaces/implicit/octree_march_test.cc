@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/implicit/emitter_cache.h"
+#include "surfaces/implicit/octree_march.h"
 
 #include <gtest/gtest.h>
 
