@@ -53,17 +53,15 @@ void Fields(Visitor& visit, ImplicitFaceOptions& o) {
   visit(FieldInfo{.name = "target_triangles",
                   .min = 100,
                   .max = 10000000,
-                  .doc =
-                      "size of the decimated face (thesis: 14000); more remain if fewer would ruin "
-                      "the shape"},
+                  .doc = "size of the decimated face (thesis: 14000); more remain if fewer would "
+                         "ruin the shape"},
         o.target_triangles);
   visit(FieldInfo{.name = "tolerance_mm",
                   .unit = "mm",
                   .min = 1e-6,
                   .max = 100,
-                  .doc =
-                      "largest distance of a polygonised vertex from the decimated face; more than "
-                      "target_triangles may remain; null: no bound"},
+                  .doc = "largest distance of a polygonised vertex from the decimated face; more "
+                         "than target_triangles may remain; null: no bound"},
         o.tolerance_mm);
   visit(FieldInfo{.name = "project",
                   .doc = "move the decimated face's vertices back onto the implicit surface, which "

@@ -3,9 +3,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <map>
 #include <set>
+#include <utility>
+#include <vector>
 
+#include "interp/dowels/dowel_area.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
@@ -27,6 +31,108 @@ void CheckDistinct(const std::array<std::string, 3>& area) {
         fmt::format("dowel network: area {} {} {} names a site twice; an area needs three sites",
                     area[0], area[1], area[2]));
   }
+}
+
+using Corners = std::array<int, 3>;
+
+std::vector<DowelArea> BuildAreas(std::span<const Dowel> dowels, const DowelNetwork& network) {
+  const TriMesh no_skull;
+  return DowelAreas("inserted", {no_skull, {}, dowels, network});
+}
+
+Corners With(Corners area, int corner, int index) {
+  area[corner] = index;
+  return area;
+}
+
+// The barycentric coordinate below which the dowel counts as on an edge, which avoids a sliver
+// between dowel and edge. Near a corner it is near two edges; there only triangles without area are
+// avoided.
+double EdgeTolerance(const Vec3& weights) {
+  constexpr double kOnEdge = 0.01, kNoArea = 1e-6;
+  return (weights.array() > kOnEdge).count() >= 2 ? kOnEdge : kNoArea;
+}
+
+bool HasEdge(const Corners& area, int a, int b) {
+  return std::ranges::count(area, a) + std::ranges::count(area, b) == 2;
+}
+
+int CornerIndex(const Corners& area, int dowel) {
+  return static_cast<int>(std::ranges::find(area, dowel) - area.begin());
+}
+
+// Splits every area at the edge into two.
+void SplitEdge(int a, int b, int index, std::vector<Corners>& areas) {
+  std::vector<Corners> split;
+  for (const Corners& area : areas) {
+    if (HasEdge(area, a, b)) {
+      split.push_back(With(area, CornerIndex(area, a), index));
+      split.push_back(With(area, CornerIndex(area, b), index));
+    } else {
+      split.push_back(area);
+    }
+  }
+  areas = std::move(split);
+}
+
+Insertion InsertInside(std::size_t at, const Vec3& weights, int index,
+                       std::vector<Corners>& areas) {
+  const double on_edge = EdgeTolerance(weights);
+  const auto corners_off = (weights.array() > on_edge).count();
+  const Corners area = areas[at];
+  if (corners_off < 2) {
+    return Insertion::kNone;
+  }
+  if (corners_off == 2) {
+    int apart = 0;
+    weights.minCoeff(&apart);
+    SplitEdge(area[(apart + 1) % 3], area[(apart + 2) % 3], index, areas);
+    return Insertion::kInside;
+  }
+  areas[at] = With(area, 0, index);
+  areas.insert(areas.begin() + static_cast<std::ptrdiff_t>(at) + 1,
+               {With(area, 1, index), With(area, 2, index)});
+  return Insertion::kInside;
+}
+
+// A border edge (an edge of only one area) with the dowel on its outer side, in the direction in
+// which it runs in its area.
+struct BorderEdge {
+  int from = -1, to = -1;
+  double distance_mm = kNaN;  // from the dowel
+};
+
+std::vector<BorderEdge> BorderBefore(const Vec3& p, std::span<const Dowel> dowels,
+                                     const std::vector<DowelArea>& areas) {
+  std::map<std::pair<int, int>, int> uses;
+  for (const DowelArea& area : areas) {
+    for (int k = 0; k < 3; ++k) {
+      ++uses[std::minmax(area.dowels[(k + 1) % 3], area.dowels[(k + 2) % 3])];
+    }
+  }
+  std::vector<BorderEdge> border;
+  for (const DowelArea& area : areas) {
+    for (int k = 0; k < 3; ++k) {
+      const int from = area.dowels[(k + 1) % 3], to = area.dowels[(k + 2) % 3];
+      if (uses.at(std::minmax(from, to)) == 1 && area.inside.row(k).dot(p) + area.offset[k] < 0) {
+        border.push_back({from, to, DistanceToSegment(p, dowels[from].base, dowels[to].base)});
+      }
+    }
+  }
+  std::ranges::stable_sort(border, {}, &BorderEdge::distance_mm);
+  return border;
+}
+
+// Returns true if the area is not a sliver and faces the same way as its dowels.
+bool IsSound(const Corners& corners, std::span<const Dowel> dowels) try {
+  constexpr double kMinHeightShare = 0.05;  // height over the edge's length
+  const std::vector<DowelArea> area = BuildAreas(dowels, {{corners}, {}});
+  const auto& base = area[0].base;
+  const Vec3 edge = base[1] - base[0];
+  return edge.cross(base[2] - base[0]).norm() > kMinHeightShare * edge.squaredNorm() &&
+         area[0].unit_normal.dot(area[0].mean_direction) > 0;
+} catch (const InputError&) {
+  return false;
 }
 
 }  // namespace
@@ -56,6 +162,22 @@ DowelNetwork BuildNetwork(const NetworkPlan& plan, std::span<const Dowel> dowels
   }
   network.missing_sites.assign(missing_sites.begin(), missing_sites.end());
   return network;
+}
+
+Insertion InsertIntoNetwork(std::span<const Dowel> dowels, int index, DowelNetwork& network) {
+  const std::vector<DowelArea> areas = BuildAreas(dowels, network);
+  const Vec3& p = dowels[index].base;
+  if (const AreaPoint in = FindArea(areas, AreaDistance::kTriangle, p); in.area != nullptr) {
+    return InsertInside(static_cast<std::size_t>(in.area - areas.data()), in.weights, index,
+                        network.areas);
+  }
+  for (const BorderEdge& edge : BorderBefore(p, dowels, areas)) {
+    if (IsSound({edge.to, edge.from, index}, dowels)) {
+      network.areas.push_back({edge.to, edge.from, index});
+      return Insertion::kOutside;
+    }
+  }
+  return Insertion::kNone;
 }
 
 }  // namespace semblance

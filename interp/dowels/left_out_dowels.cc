@@ -15,8 +15,8 @@ namespace {
 
 using Areas = std::vector<std::array<int, 3>>;
 
-// The dowels around one, each joined with the next, if they close a ring: then the first is not
-// named again at the end. Empty at the border, or where areas do not turn the same way.
+// The ring of dowels around a dowel, without repeating the first at the end. Empty at the border,
+// or if the areas are not oriented consistently.
 std::vector<int> RingAround(const Areas& areas, int dowel) {
   std::map<int, int> next;
   for (std::array<int, 3> area : areas) {
@@ -40,7 +40,7 @@ std::vector<int> RingAround(const Areas& areas, int dowel) {
   return !ring.empty() && next.at(ring.back()) == ring.front() ? ring : std::vector<int>{};
 }
 
-// The least angle of a triangle in the plane across `up`; below 0 if it turns the other way.
+// The smallest angle of a triangle projected along `up`; negative if the triangle is turned over.
 double LeastAngle(const std::array<Vec3, 3>& corner, const Vec3& up) {
   double least = std::numeric_limits<double>::infinity();
   for (int k = 0; k < 3; ++k) {
@@ -51,7 +51,7 @@ double LeastAngle(const std::array<Vec3, 3>& corner, const Vec3& up) {
   return least;
 }
 
-// The ring's fan from its dowel `apex`.
+// The fan of areas from the ring's dowel number `apex`.
 Areas Fan(const std::vector<int>& ring, std::size_t apex) {
   Areas areas;
   for (std::size_t k = 1; k + 1 < ring.size(); ++k) {
@@ -61,7 +61,7 @@ Areas Fan(const std::vector<int>& ring, std::size_t apex) {
   return areas;
 }
 
-// Has each area a triangle and cutting planes?
+// Returns true if each area has a triangle and cutting planes.
 bool AreSound(const Areas& areas, std::span<const Dowel> dowels) try {
   const TriMesh no_skull;
   DowelAreas("left out", {no_skull, {}, dowels, {areas, {}}});
@@ -70,19 +70,19 @@ bool AreSound(const Areas& areas, std::span<const Dowel> dowels) try {
   return false;
 }
 
-// Areas across the gap that the dowel leaves; none where there is no sound fan.
+// New areas across the gap that the dowel leaves; none if no fan is sound.
 Areas Closing(const Areas& areas, std::span<const Dowel> dowels, int dowel) {
-  constexpr double kSound_rad = 0.03;
+  constexpr double kMinAngle_rad = 0.03;  // flatter fans (below 1.7 degrees) are slivers
   const std::vector<int> ring = RingAround(areas, dowel);
   if (ring.size() < 3) {
     return {};
   }
   Vec3 up = dowels[dowel].direction;
   if (LeastAngle({dowels[dowel].base, dowels[ring[0]].base, dowels[ring[1]].base}, up) < 0) {
-    up = -up;  // the network's areas turn the other way
+    up = -up;  // the network's areas are oriented the other way
   }
   Areas best;
-  double best_angle = kSound_rad;
+  double best_angle = kMinAngle_rad;
   for (std::size_t apex = 0; apex < ring.size(); ++apex) {
     const Areas fan = Fan(ring, apex);
     double least = std::numeric_limits<double>::infinity();
@@ -107,7 +107,7 @@ double ShownDowels::NearestTo_mm(const Vec3& p) const {
   return nearest;
 }
 
-ShownDowels Without(const DepthInput& input, const std::vector<std::size_t>& fold) {
+ShownDowels LeaveOutDowels(const DepthInput& input, const std::vector<std::size_t>& fold) {
   ShownDowels shown;
   std::vector<int> index(input.dowels.size(), -1);
   for (std::size_t i = 0; i < input.dowels.size(); ++i) {

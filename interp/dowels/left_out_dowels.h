@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is left of dowels and network when some dowels are left out.
+// Dowels and network without some left-out dowels.
 #pragma once
 
 #include <cstddef>
@@ -16,14 +16,14 @@ struct ShownDowels {
   std::vector<Dowel> dowels;
   DowelNetwork network;
 
-  // The distance from a point to the nearest of them.
+  // The distance from a point to the nearest dowel.
   double NearestTo_mm(const Vec3& p) const;
 };
 
-// The network without the fold's dowels. Where a left-out dowel stood inside the network, its
-// neighbours get areas of their own across the gap, as if it had never been placed: the fan from
-// one of them whose least angle is largest. At the border its areas are gone, and so they are
-// where no fan is sound.
-ShownDowels Without(const DepthInput& input, const std::vector<std::size_t>& fold);
+// Removes the fold's dowels from the network. If a removed dowel was inside the network, its
+// neighbours are joined by new areas across the gap, as if it had never been placed. The chosen fan
+// from one neighbour is the one with the largest minimum angle. At the border, or if no fan is
+// sound, the dowel's areas are removed without replacement.
+ShownDowels LeaveOutDowels(const DepthInput& input, const std::vector<std::size_t>& fold);
 
 }  // namespace semblance

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "interp/kriging/gaussian_regression.h"
-#include "interp/kriging/kriging_likelihood.h"
+#include "interp/kriging/kriging_process.h"
 #include "interp/kriging/surface_matern_likelihood.h"
-#include "interp/on_surface/bone_relief.h"
+#include "interp/on_surface/bone_geometry.h"
 #include "interp/on_surface/coarse_surface.h"
 #include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -20,18 +20,19 @@
 namespace semblance {
 namespace {
 
-constexpr Eigen::Index kFitSamples = 60;  // enough for three numbers; the modes grow with them
+constexpr Eigen::Index kFitSamples = 60;  // enough to determine three numbers; the number of modes
+                                          // grows with them
 
-// The surface that the process lives on, and the dowels there.
+// The surface of the process, and the dowels on it.
 struct SurfaceScene {
   CoarseSurface surface;
   MaternDomain domain;
   std::vector<Vec3> bases;
-  std::vector<CornerWeights> at;  // of each dowel
+  std::vector<CornerWeights> at;  // per dowel
   SurfaceMaternData data;
 };
 
-// Of each dowel, on the side of the bone that its base is closest to.
+// Locates each dowel on the side of the bone that is closest to its base.
 std::vector<CornerWeights> LocateSamples(const TriMesh& skull, const CoarseSurface& surface,
                                          const std::vector<Vec3>& bases) {
   const MeshQuery query(skull);
@@ -43,26 +44,26 @@ std::vector<CornerWeights> LocateSamples(const TriMesh& skull, const CoarseSurfa
   return located;
 }
 
-// 1 where the bone is smooth.
+// The relative length per vertex; 1 where the bone is smooth.
 Eigen::VectorXd LengthShares(const TriMesh& bone, double half_at_relief_mm) {
   constexpr std::array kScale_mm = {40.0};
   const Eigen::ArrayXd relief_mm = BoneRelief(bone, kScale_mm).row(0).transpose().array().abs();
   return (1 + relief_mm / half_at_relief_mm).inverse();
 }
 
-MaternDomain DomainOf(const SurfaceMatern& options, const TriMesh& bone) {
+MaternDomain MakeDomain(const SurfaceMatern& options, const TriMesh& bone) {
   MaternDomain domain = {bone.points, BuildLaplacian(bone)};
   return options.half_at_relief_mm
              ? WithLengths(std::move(domain), LengthShares(bone, *options.half_at_relief_mm))
              : domain;
 }
 
-SurfaceScene SceneOf(const SurfaceMatern& options, const DepthInput& input,
-                     const std::vector<DepthSample>& samples, const MeanRegressors& mean,
-                     const RunContext& run) {
+SurfaceScene MakeScene(const SurfaceMatern& options, const DepthInput& input,
+                       const std::vector<DepthSample>& samples, const MeanRegressors& mean,
+                       const RunContext& run) {
   const auto n = static_cast<Eigen::Index>(samples.size());
   SurfaceScene scene{CoarseSurface(input.skull, options.edge_mm, run), {}, {}, {}, {}};
-  scene.domain = DomainOf(options, scene.surface.mesh());
+  scene.domain = MakeDomain(options, scene.surface.mesh());
   scene.data = {Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd()};
   for (const DepthSample& sample : samples) {
     const auto i = static_cast<Eigen::Index>(scene.bases.size());
@@ -75,8 +76,8 @@ SurfaceScene SceneOf(const SurfaceMatern& options, const DepthInput& input,
   return scene;
 }
 
-// One column per dowel of `some`.
-Eigen::MatrixXd WeightsOf(const SurfaceScene& scene, const std::vector<std::size_t>& some) {
+// The weights of vertices; one column per dowel of `some`.
+Eigen::MatrixXd DowelWeights(const SurfaceScene& scene, const std::vector<std::size_t>& some) {
   Eigen::MatrixXd weights =
       Eigen::MatrixXd::Zero(std::ssize(scene.domain.points), std::ssize(some));
   for (std::size_t k = 0; k < some.size(); ++k) {
@@ -94,14 +95,15 @@ SurfaceMaternHyper HyperFor(const SurfaceMatern& options, const SurfaceScene& sc
     return {*options.length_mm, *options.signal_mm, 0};
   }
   const std::vector<std::size_t> some = FarthestFirst(scene.bases, 0, kFitSamples);
-  const ReducedMatern correlations(scene.domain, WeightsOf(scene, some), SearchPoles(options), run);
+  const ReducedMatern correlations(scene.domain, DowelWeights(scene, some), SearchPoles(options),
+                                   run);
   return FitHyper(options,
                   {scene.data.depth_mm(some), scene.data.nugget_mm2(some),
                    scene.data.regressors(some, Eigen::all)},
                   correlations, run);
 }
 
-// The process, once its length, signal and nugget are known.
+// The process with known length, signal and nugget.
 class SurfaceProcess {
  public:
   SurfaceProcess(const SurfaceMatern& options, const SurfaceScene& scene,
@@ -128,7 +130,7 @@ class SurfaceProcess {
   }
 
  private:
-  // Fills with_dowels_ and local_, too.
+  // Also fills with_dowels_ and local_.
   GaussianRegression Regression(const SurfaceMatern& options, const SurfaceScene& scene,
                                 const SurfaceMaternHyper& hyper, const RunContext& run) {
     const MaternField field(scene.domain, options.alpha,
@@ -138,7 +140,7 @@ class SurfaceProcess {
     std::iota(all.begin(), all.end(), std::size_t{0});
     local_ = field.LocalCovariances();
     run.ThrowIfStopped();
-    with_dowels_ = field.Covariances(WeightsOf(scene, all), run).transpose();
+    with_dowels_ = field.Covariances(DowelWeights(scene, all), run).transpose();
     for (Eigen::Index k = 0; k < n; ++k) {
       with_dowels_.row(k) *= signal_mm_ / std::sqrt(VarianceAt(scene.at[k]));
     }
@@ -152,7 +154,7 @@ class SurfaceProcess {
     return {covariance, signal_mm_ * signal_mm_, scene.data.depth_mm, scene.data.regressors};
   }
 
-  // Of the field before it is divided by its deviation.
+  // The variance of the field before its division by the standard deviation.
   double VarianceAt(const CornerWeights& at) const {
     double variance = 0;
     for (int a = 0; a < 3; ++a) {
@@ -164,7 +166,7 @@ class SurfaceProcess {
     return variance;
   }
 
-  // With each dowel.
+  // The covariances with each dowel.
   Eigen::VectorXd CovariancesAt(const CornerWeights& at) const {
     Eigen::VectorXd with = at.weights[0] * with_dowels_.col(at.corners[0]);
     with += at.weights[1] * with_dowels_.col(at.corners[1]);
@@ -174,8 +176,8 @@ class SurfaceProcess {
 
   bool with_sd_;
   double signal_mm_;
-  Eigen::SparseMatrix<double> local_;  // covariances along edges, before the division
-  Eigen::MatrixXd with_dowels_;        // n x m: half divided, by the dowels' deviations
+  Eigen::SparseMatrix<double> local_;  // covariances along edges before the division
+  Eigen::MatrixXd with_dowels_;        // n x m; divided by the dowels' standard deviations only
   GaussianRegression regression_;
 };
 
@@ -189,7 +191,7 @@ DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& inpu
   const std::vector<DepthSample> samples = DepthSamples(input.dowels);
   const DepthLimits limits(samples, options.clamp);
   const MeanRegressors mean(options.mean, SurfaceMatern::kName, input, run);
-  const SurfaceScene scene = SceneOf(options, input, samples, mean, run);
+  const SurfaceScene scene = MakeScene(options, input, samples, mean, run);
   const Eigen::MatrixXd regressors = mean.AtVertices(run);
   const SurfaceMaternHyper hyper = HyperFor(options, scene, run);
   const SurfaceProcess process(options, scene, hyper, run);

@@ -6,23 +6,24 @@
 
 #include "interp/kriging/bounded_minimum.h"
 #include "interp/kriging/gaussian_regression.h"
-#include "interp/kriging/kriging_likelihood.h"
+#include "interp/kriging/kriging_process.h"
 
 namespace semblance {
 namespace {
 
-constexpr double kReach = 2.5;  // of the length's logarithm, to either side of the prior's
+constexpr double kReach = 2.5;  // range of the length's logarithm on each side of the prior's
+                                // median
 constexpr int kPoles = 8;
 
-double NuggetOf(const SurfaceMatern& options, const Eigen::VectorXd& logs) {
+double FittedNugget(const SurfaceMatern& options, const Eigen::VectorXd& logs) {
   return options.fit_nugget ? std::exp(logs[2]) : 0;
 }
 
-SurfaceMaternHyper HyperOf(const SurfaceMatern& options, const Eigen::VectorXd& logs) {
-  return {std::exp(logs[0]), std::exp(logs[1]), NuggetOf(options, logs)};
+SurfaceMaternHyper MakeHyper(const SurfaceMatern& options, const Eigen::VectorXd& logs) {
+  return {std::exp(logs[0]), std::exp(logs[1]), FittedNugget(options, logs)};
 }
 
-// Of the three logarithms.
+// The ranges of the three logarithms.
 SearchRange SearchBounds(const SurfaceMatern& options, const SurfaceMaternData& data) {
   const double prior = std::log(options.length_prior_mm);
   const double spread = std::log(DepthSpread(data.depth_mm));
@@ -61,7 +62,7 @@ std::vector<double> SearchPoles(const SurfaceMatern& options) {
 double SurfaceMaternCost(const SurfaceMatern& options, const SurfaceMaternData& data,
                          const ReducedMatern& correlations, const Eigen::VectorXd& logs,
                          Eigen::VectorXd* gradient) {
-  const SurfaceMaternHyper hyper = HyperOf(options, logs);
+  const SurfaceMaternHyper hyper = MakeHyper(options, logs);
   const double variance = hyper.signal_mm * hyper.signal_mm;
   const double nugget = hyper.nugget_mm * hyper.nugget_mm;
   const MaternCorrelations r = correlations.At(options.alpha, hyper.length_mm);
@@ -94,9 +95,9 @@ SurfaceMaternHyper FitHyper(const SurfaceMatern& options, const SurfaceMaternDat
   };
   SearchRange bounds = SearchBounds(options, data);
   const Eigen::VectorXd logs = FindLogs(bounds, cost, misfit_mm2, run);
-  SurfaceMaternHyper hyper = HyperOf(options, logs);
-  // A nugget at its low end is none, which is no fault.
-  hyper.at_end = EndsInWords(kNames, bounds, cost, logs);
+  SurfaceMaternHyper hyper = MakeHyper(options, logs);
+  // A nugget at its lower bound means no nugget and is not reported.
+  hyper.at_end = DescribeRangeEnds(kNames, bounds, cost, logs);
   return hyper;
 }
 

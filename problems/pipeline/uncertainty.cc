@@ -7,7 +7,7 @@
 
 #include "fitting/uncertainty/error_propagation.h"
 #include "fitting/uncertainty/pivoted_root.h"
-#include "interp/evaluation/calibration.h"
+#include "interp/evaluation/scores.h"
 #include "interp/kriging/kriging_process.h"
 #include "problems/conditional/condition_depths.h"
 #include "problems/prior/depth_spread.h"

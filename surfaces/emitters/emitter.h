@@ -30,10 +30,6 @@ struct SplitEmitter {
   double cut_below = 0;
 };
 
-// e(p) = (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the
-// integral is 2 pi h^(-k) / (k+1). Hence coplanar triangles of one depth l sum to (l/h)^k, and
-// their surface is flat, at exactly the height l, for any mesh (docs/mathematics.md, 2).
-//
 // The depth over a triangle. With kLinear l^k moves under the integral, which avoids steps where
 // the depth changes from triangle to triangle. (The thesis's emitters have one depth per triangle.)
 enum class EmitterDepth { kMean, kLinear };
@@ -41,6 +37,9 @@ constexpr auto EnumNames(EmitterDepth) {
   return std::to_array<std::string_view>({"mean", "linear"});
 }
 
+// e(p) = (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the
+// integral is 2 pi h^(-k) / (k+1). Hence coplanar triangles of one depth l sum to (l/h)^k, and
+// their surface is flat, at exactly the height l, for any mesh (docs/mathematics.md, 2).
 struct FlatEmitter {
   static constexpr std::string_view kName = "flat";
   double decay = 6;
@@ -69,8 +68,7 @@ inline constexpr FieldInfo kCutBelow{
     .max = 0.1,
     .doc =
         "emissions below this count as 0; the thesis's boxes (3.2.2, m = 500), but round, are "
-        "0.002. "
-        "The loss adds up where the mesh is dense; 0 cuts nothing"};
+        "0.002. The loss adds up where the mesh is dense; 0 cuts nothing"};
 }  // namespace emitter_internal
 template <class Visitor>
 void Fields(Visitor& visit, ThesisEmitter& o) {
@@ -91,12 +89,10 @@ void Fields(Visitor& visit, SplitEmitter& o) {
 template <class Visitor>
 void Fields(Visitor& visit, FlatEmitter& o) {
   visit(emitter_internal::kDecay, o.decay);
-  visit(
-      FieldInfo{
-          .name = "depth",
-          .doc = "depth over a triangle: the mean of its corners (thesis 3.1), or linear between "
-                 "them"},
-      o.depth);
+  visit(FieldInfo{.name = "depth",
+                  .doc = "depth over a triangle: the mean of its corners (thesis 3.1), or linear "
+                         "between them"},
+        o.depth);
 }
 
 }  // namespace semblance

@@ -22,13 +22,13 @@ template <class Visitor>
 void Fields(Visitor& visit, ImplicitOptions& o) {
   visit(FieldInfo{.name = "emitter", .doc = "emission of a triangle of the skull"}, o.emitter);
   visit(
-      FieldInfo{.name = "tail_error",
-                .min = 0,
-                .max = 0.1,
-                .doc =
-                    "bound on the error of the far field, where 1 is the surface; distant emitters "
-                    "are summed by multipoles, and more distant ones are left out; 0 sums "
-                    "every emitter"},
+      FieldInfo{
+          .name = "tail_error",
+          .min = 0,
+          .max = 0.1,
+          .doc =
+              "bound on the error of the far field, where 1 is the surface; distant emitters are "
+              "summed by multipoles, and more distant ones are left out; 0 sums every emitter"},
       o.tail_error);
 }
 

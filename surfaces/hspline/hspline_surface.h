@@ -2,7 +2,7 @@
 // The hierarchical B-spline surface (Forsey & Bartels 1988; thesis ch. 4). It is bicubic and
 // uniform, and each level halves the patches of the level before. A vertex x of level L >= 1 is
 // stored as an offset o from the surface of level L - 1 (thesis 4.1):
-//  x = r + F o,
+//   x = r + F o,
 // where r is that surface's point at the vertex's Greville point (u,v), and the columns of F are
 // its unit u-tangent, normal x u-tangent, and normal there. Hence detail moves and turns with the
 // coarser surface. Only edited vertices have an offset. All others follow from the coarser level by
@@ -119,7 +119,7 @@ class HSplineSurface {
 // The principal curvatures at a point, in 1/mm. A curvature is positive where the surface bends
 // towards its normal (du x dv); a ball with outward normals has principal curvatures -1 / radius.
 struct SurfaceCurvature {
-  double largest_per_mm = kNaN;  // principal curvatures
+  double largest_per_mm = kNaN;
   double smallest_per_mm = kNaN;
   Vec3 largest_direction = Vec3::Constant(kNaN);   // unit tangents, perpendicular; together with
   Vec3 smallest_direction = Vec3::Constant(kNaN);  // the normal they are right-handed

@@ -14,10 +14,10 @@ namespace semblance {
 
 // Caches each emitter's value at the corners of the octree's nodes during the march through the
 // layers (thesis 3.2.3, fig. 3.4). The depth d of layer k is the smallest depth of a node with a
-// corner in it: log2(size) minus the index of the lowest bit of k. Of all layers of one depth only
-// one bounds the nodes that meet the current slice. Hence one layer per depth is kept, and is
-// replaced when the march reaches the next. Layer 0 has no lowest bit; its depth is 0, like that of
-// the root's upper side, and it is kept separately.
+// corner in it: log2(size) minus the index of the lowest bit of k. Only one layer of each depth
+// bounds the nodes that meet the current slice. Hence one layer per depth is kept, and is replaced
+// when the march reaches the next. Layer 0 has no lowest bit; its depth is 0, like that of the
+// root's upper side, and it is kept separately.
 class EmitterCache {
  public:
   // size: cells along the octree's root, a power of 2. Keeps references to surface and grid.

@@ -30,14 +30,12 @@ struct NarrowBand {
 };
 template <class Visitor>
 void Fields(Visitor& visit, NarrowBand& o) {
-  visit(
-      FieldInfo{
-          .name = "components",
-          .doc = "outermost: only the component through the surface's outermost points and, if "
-                 "the cells are too coarse to connect these, components that share cells with it; "
-                 "all: every component in the grid, at many times the cost, so that dropped "
-                 "sheets and fragments are counted"},
-      o.components);
+  visit(FieldInfo{.name = "components",
+                  .doc = "outermost: only the component through the surface's outermost points "
+                         "and, if the cells are too coarse to connect these, components that share "
+                         "cells with it; all: every component in the grid, at many times the cost, "
+                         "so that dropped sheets and fragments are counted"},
+        o.components);
 }
 
 // Evaluates every corner of the grid (PolygonizeAll, thesis 3.2.1). Distant emitters are left out
@@ -69,14 +67,12 @@ struct McOctree {
 };
 template <class Visitor>
 void Fields(Visitor& visit, McOctree& o) {
-  visit(
-      FieldInfo{.name = "influence",
-                .min = 1,
-                .max = 1e9,
-                .doc =
-                    "m: an emitter's box extends to the distance at which m copies of the emitter "
-                    "would just make a surface (thesis 3.2.2)"},
-      o.influence);
+  visit(FieldInfo{.name = "influence",
+                  .min = 1,
+                  .max = 1e9,
+                  .doc = "m: an emitter's box extends to the distance at which m copies of the "
+                         "emitter would just make a surface (thesis 3.2.2)"},
+        o.influence);
   visit(kListSums, o.sums);
 }
 
@@ -105,13 +101,12 @@ void Fields(Visitor& visit, MinMaxOctree& o) {
                   .doc = "epsilon_min: an emitter that gives less than this everywhere in a box is "
                          "not listed there (thesis 3.2.3)"},
         o.least_emission);
-  visit(
-      FieldInfo{.name = "minimum",
-                .doc = "lower bound of an emission in a box: ball, from the distance of the box's "
-                       "ball; corners, the smallest value at the box's corners; cached_corners, "
-                       "the same, with each value computed once and kept for all levels of the "
-                       "octree around the current slice (thesis 3.2.3)"},
-      o.minimum);
+  visit(FieldInfo{.name = "minimum",
+                  .doc = "lower bound of an emission in a box: ball, from the distance of the "
+                         "box's ball; corners, the smallest value at the box's corners; "
+                         "cached_corners, the same, with each value computed once and kept for all "
+                         "levels of the octree around the current slice (thesis 3.2.3)"},
+        o.minimum);
   visit(kListSums, o.sums);
 }
 

@@ -131,9 +131,9 @@ class SparseGrid {
   std::vector<std::unique_ptr<Block>> blocks_;
 };
 
-// Follows components from crossed cells to their neighbours, wave by wave. Of two sheets in a cell
-// it follows only the one on which it arrived. A cell's `edges` are those known to belong to the
-// followed components.
+// Follows components from crossed cells to their neighbours, wave by wave. If a cell contains two
+// sheets, it follows only the one on which it arrived. A cell's `edges` are those known to belong
+// to the followed components.
 class Continuation {
  public:
   Continuation(const ScalarField& field, const SampleGrid& grid, const RunContext& context)

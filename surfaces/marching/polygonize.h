@@ -65,9 +65,8 @@ void Fields(Visitor& visit, EdgeSearchOptions& o) {
   visit(FieldInfo{.name = "tolerance",
                   .min = 1e-9,
                   .max = 0.5,
-                  .doc =
-                      "accuracy of a crossing, as a share of the edge; regula_falsi keeps it where "
-                      "the field is convex or concave along the edge"},
+                  .doc = "accuracy of a crossing, as a share of the edge; regula_falsi keeps it "
+                         "where the field is convex or concave along the edge"},
         o.tolerance);
 }
 

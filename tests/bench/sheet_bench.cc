@@ -12,7 +12,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/bench/fit_measure.h"
 #include "tests/testing/bent_sheets.h"
-#include "tests/testing/grid_mesh.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance::bench {
 namespace {

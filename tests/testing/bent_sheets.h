@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Open sheets that fold over every plane, over the unit square, and scattered points on them.
+// Open sheets over the unit square that are not a graph over any plane, and scattered points on
+// them.
 #pragma once
 
 #include <algorithm>
@@ -17,7 +18,7 @@ namespace semblance::testing {
 
 using Sheet = std::function<Vec3(const Vec2&)>;
 
-// A tube of radius 10 that is open along an eighth of a turn and more.
+// A tube of radius 10 with a gap of an eighth of a turn and more.
 inline Vec3 OpenPipe(const Vec2& q) {
   const double turn = 4.6 * (q.x() - 0.5);
   return {10 * std::cos(turn), 20 * q.y(), 10 * std::sin(turn)};
@@ -30,13 +31,13 @@ inline Vec3 Ess(const Vec2& q) {
   return {-10 * side * std::sin(turn), 30 * q.y(), side * 10 * (1 - std::cos(turn))};
 }
 
-// One turn and a half of a spiral, a pitch of 6.28 apart.
+// One and a half turns of a spiral with a pitch of 6.28.
 inline Vec3 SpiralRoll(const Vec2& q) {
   const double turn = 1.5 * std::numbers::pi * (1 + 2 * q.x());
   return {turn * std::cos(turn), 21 * q.y(), turn * std::sin(turn)};
 }
 
-// A sphere of radius 10 as far as 130 degrees from its pole.
+// A sphere of radius 10 up to 130 degrees from its pole.
 inline Vec3 DeepBowl(const Vec2& q) {
   const Vec2 p = 2 * q - Vec2(1, 1);
   const double polar = 130 * std::numbers::pi / 180 * p.cwiseAbs().maxCoeff(),
@@ -54,7 +55,7 @@ inline std::vector<NamedSheet> BentSheets() {
   return {{"pipe", OpenPipe}, {"S", Ess}, {"roll", SpiralRoll}, {"bowl", DeepBowl}};
 }
 
-// By differences.
+// The area element by finite differences.
 struct Tangents {
   Vec3 u, v;
   Vec3 Normal() const { return u.cross(v); }  // times area
@@ -66,7 +67,7 @@ inline Tangents TangentsAt(const Sheet& sheet, const Vec2& q) {
   return {(sheet(q + u) - sheet(q - u)) / (2 * kStep), (sheet(q + v) - sheet(q - v)) / (2 * kStep)};
 }
 
-// With waves across it, so that a fit has something to find.
+// Adds waves to the sheet, so that a fit has detail to find.
 inline Sheet Wavy(const Sheet& sheet, double height_mm) {
   return [=](const Vec2& q) -> Vec3 {
     const double wave = std::sin(9 * q.x() + 1) * std::sin(7 * q.y() + 3 * q.x());
@@ -85,16 +86,16 @@ inline double AreaOf(const Sheet& sheet) {
 
 struct SheetPoints {
   std::vector<Vec3> positions;
-  std::vector<Vec2> at;      // true ones, in the unit square
-  double spacing_mm = kNaN;  // root of the area that a point has
+  std::vector<Vec2> at;      // true (u,v) in the unit square
+  double spacing_mm = kNaN;  // square root of the area per point
 };
 
 struct SheetScatter {
   int count = 2000;
-  double noise = 0;       // standard deviation along each axis, of the spacing
-  double outliers = 0;    // share that lies anywhere in the box
-  double unevenness = 0;  // how much denser than elsewhere it gets towards u = 1
-  int holes = 0;          // of a fourteenth of a side
+  double noise = 0;       // standard deviation along each axis, relative to the spacing
+  double outliers = 0;    // share of points anywhere in the box
+  double unevenness = 0;  // relative density at u = 1
+  int holes = 0;          // number of round holes of radius 0.07
 };
 
 inline bool IsInHole(const Vec2& q, int holes) {
@@ -106,7 +107,7 @@ inline bool IsInHole(const Vec2& q, int holes) {
   return false;
 }
 
-// Evenly over the area but for what is asked for.
+// Points with even density over the area, changed by the options.
 inline SheetPoints ScatterOver(const Sheet& sheet, const SheetScatter& how) {
   Random random(1);
   SheetPoints points{.positions = {}, .at = {}, .spacing_mm = std::sqrt(AreaOf(sheet) / how.count)};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Smooth closed surfaces without handles that rays from no centre meet once each, by formula.
+// Smooth closed surfaces of genus 0 that are not star-shaped about any center, given by formulas.
 #pragma once
 
 #include <algorithm>
@@ -16,14 +16,14 @@
 
 namespace semblance::testing {
 
-// A bump of the field that a surface is a level of: height exp(-|(x - centre) / width|^2).
+// A bump of the field whose level set is the surface: height exp(-|(x - center) / width|^2).
 struct FieldBump {
   Vec3 centre = Vec3::Zero();
   Vec3 width = Vec3::Ones();
   double height = 1;
 };
 
-// The places where the bumps' sum is 1; more inside. About two units wide.
+// The surface where the bumps' sum is 1; the sum is larger inside. About two units wide.
 struct ClosedShape {
   std::string name;
   std::vector<FieldBump> bumps;
@@ -43,7 +43,7 @@ struct ClosedShape {
     }
     return sum;
   }
-  // Of the surface, by Newton's method along the gradient; for x near it.
+  // The surface's point near x, by Newton's method along the gradient.
   Vec3 FootOf(Vec3 x) const {
     for (int round = 0; round < 8; ++round) {
       const Vec3 gradient = Gradient(x);
@@ -53,7 +53,7 @@ struct ClosedShape {
   }
 };
 
-// A tube that thins towards both ends, bent by 230 degrees.
+// A tube that gets thinner towards both ends, bent by 230 degrees.
 inline ClosedShape Bean() {
   ClosedShape shape{.name = "bean", .bumps = {}};
   for (int k = 0; k < 24; ++k) {
@@ -110,8 +110,7 @@ inline ClosedShape EllipsoidWithEars() {
   return shape;
 }
 
-// About so many points on the surface with even triangles between them, each off by `noise` in each
-// coordinate.
+// About `count` points on the surface with regular triangles, with noise in each coordinate.
 inline TriMesh MeshOf(const ClosedShape& shape, double count, double noise) {
   constexpr int kCells = 60;
   constexpr double kReach = 1.8013;  // no corner of the grid lies on the surface
@@ -129,8 +128,7 @@ inline TriMesh MeshOf(const ClosedShape& shape, double count, double noise) {
   return mesh;
 }
 
-// Largest and root mean square distance of the places from v = first to last from the shape, as
-// areas weigh them.
+// Largest and area-weighted RMS distance of the surface from the shape, for v from first to last.
 struct ShapeErrors {
   double rms = 0, largest = 0;
 };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points to fit as the text of a table.
+// Writes points to fit as the text of a table.
 #pragma once
 
 #include <fmt/format.h>

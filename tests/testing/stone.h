@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A closed surface that every ray from the origin meets once, smooth over its poles.
+// A closed surface that is star-shaped about the origin and smooth at its poles.
 #pragma once
 
 #include <algorithm>
@@ -13,7 +13,8 @@
 
 namespace semblance::testing {
 
-using RadiusAlong = std::function<double(const Vec3& unit)>;  // the surface's from the origin
+// distance of the surface from the origin
+using RadiusAlong = std::function<double(const Vec3& unit)>;
 
 inline double BallRadius(const Vec3&) { return 1; }
 inline double StoneRadius(const Vec3& d) {
@@ -21,7 +22,7 @@ inline double StoneRadius(const Vec3& d) {
          0.1 * std::sin(4 * d.z() + 2 * d.x() - d.y());
 }
 
-// Evenly over all directions.
+// Points in uniformly distributed directions.
 inline std::vector<Vec3> PointsAround(const RadiusAlong& radius, int count, double noise) {
   Random random(3);
   std::vector<Vec3> positions;
@@ -33,7 +34,7 @@ inline std::vector<Vec3> PointsAround(const RadiusAlong& radius, int count, doub
   return positions;
 }
 
-// Largest and root mean square distance along the rays, of rings from v = first to last.
+// Largest and RMS distance along rays from the origin, for rings from v = first to last.
 struct RingErrors {
   double rms = 0, largest = 0;
 };

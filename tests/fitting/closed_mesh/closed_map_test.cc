@@ -15,7 +15,6 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/closed_shapes.h"
 #include "tests/testing/shapes.h"
-#include "tests/testing/shuffled.h"
 
 namespace semblance {
 namespace {

@@ -6,8 +6,8 @@
 #include <Eigen/Eigenvalues>
 
 #include "surfaces/base/random.h"
-#include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {

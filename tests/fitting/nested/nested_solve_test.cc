@@ -12,8 +12,8 @@
 
 #include "fitting/solve/level_fit.h"
 #include "surfaces/base/random.h"
-#include "tests/testing/plain_bspline.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {

@@ -9,7 +9,6 @@
 
 #include "fitting/parameters/one_to_one.h"
 #include "surfaces/base/error.h"
-#include "tests/testing/grid_mesh.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {

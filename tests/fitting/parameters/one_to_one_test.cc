@@ -10,9 +10,9 @@
 
 #include "surfaces/base/random.h"
 #include "tests/testing/bent_sheets.h"
-#include "tests/testing/grid_mesh.h"
 #include "tests/testing/point_sets.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "interp/schemes/barycentric.h"
+#include "interp/schemes/network_schemes.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -14,7 +14,7 @@ using testing::DowelScene;
 using ::testing::ElementsAre;
 using testing::FlatScene;
 
-// FlatScene's four with a fifth in their middle, and four areas around it.
+// The four dowels of FlatScene with a fifth in their middle, and four areas around it.
 DowelScene CrossScene() {
   DowelScene scene = FlatScene();
   scene.dowels.push_back({"zz", {20, 20, 0}, Vec3(0, 0, 1), 12, 1});
@@ -24,10 +24,10 @@ DowelScene CrossScene() {
 
 TEST(LeftOutDowels, InsideTheNetworkLeaveNoGap) {
   const DowelScene scene = CrossScene();
-  const ShownDowels shown = Without(scene.Input(), {4});
+  const ShownDowels shown = LeaveOutDowels(scene.Input(), {4});
   EXPECT_EQ(shown.dowels.size(), 4u);
   ASSERT_EQ(shown.network.areas.size(), 2u);
-  // On the diagonal that the fan has, the mean of its two ends; as if the dowel had never been.
+  // On the fan's diagonal the depth is the mean of its two ends, as if the dowel had never existed.
   const DowelScene asked = scene.At({{20, 20, 0}, {12, 20, 0}, {20, 29, 0}});
   const DepthField field = InterpolateDepth(
       Barycentric{}, {asked.skull, asked.normals, shown.dowels, shown.network}, {});
@@ -42,20 +42,20 @@ TEST(LeftOutDowels, AreClosedWhicheverWayTheAreasTurn) {
   for (auto& [a, b, c] : scene.network.areas) {
     std::swap(a, b);
   }
-  EXPECT_EQ(Without(scene.Input(), {4}).network.areas.size(), 2u);
+  EXPECT_EQ(LeaveOutDowels(scene.Input(), {4}).network.areas.size(), 2u);
 }
 
-TEST(LeftOutDowels, AtTheBorderTakeTheirAreasAway) {
+TEST(LeftOutDowels, AtTheBorderLoseTheirAreas) {
   const DowelScene scene = CrossScene();
-  const ShownDowels shown = Without(scene.Input(), {0});
+  const ShownDowels shown = LeaveOutDowels(scene.Input(), {0});
   EXPECT_THAT(shown.network.areas, ElementsAre(ElementsAre(0, 1, 3), ElementsAre(1, 2, 3)));
-  EXPECT_TRUE(Without(scene.Input(), {0, 2}).network.areas.empty());
+  EXPECT_TRUE(LeaveOutDowels(scene.Input(), {0, 2}).network.areas.empty());
 }
 
 TEST(LeftOutDowels, TheNearestIsTheNearestOfThoseShown) {
   const DowelScene scene = FlatScene();
-  EXPECT_EQ(Without(scene.Input(), {0}).NearestTo_mm({5, 5, 0}), 30);
-  EXPECT_EQ(Without(scene.Input(), {}).NearestTo_mm({5, 5, 0}), 0);
+  EXPECT_EQ(LeaveOutDowels(scene.Input(), {0}).NearestTo_mm({5, 5, 0}), 30);
+  EXPECT_EQ(LeaveOutDowels(scene.Input(), {}).NearestTo_mm({5, 5, 0}), 0);
 }
 
 }  // namespace

@@ -8,7 +8,6 @@
 #include <cmath>
 
 #include "surfaces/base/error.h"
-#include "tests/testing/plain_bspline.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/splines.h"
 

@@ -21,11 +21,11 @@
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
-#include "tests/testing/grid_mesh.h"
 #include "tests/testing/point_csv.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {

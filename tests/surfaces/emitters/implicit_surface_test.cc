@@ -23,8 +23,7 @@ ImplicitSurface Surface(const TriMesh& mesh, double depth_mm, const Emitter& emi
                          {emitter, tail_error});
 }
 
-// Where the value crosses zero on the way from `inside` along `direction`; the outermost within
-// reach.
+// The outermost zero of the value along `direction` from `inside`, within reach.
 double CrossingHeight(const ImplicitSurface& surface, const Vec3& base, const Vec3& direction,
                       double reach_mm) {
   double low = 0, high = reach_mm;
@@ -39,8 +38,7 @@ double CrossingHeight(const ImplicitSurface& surface, const Vec3& base, const Ve
   return low;
 }
 
-// A plate of 280 mm with right triangles of the given leg; its middle. The tail beyond 1e-3 is left
-// out where that is quicker.
+// A plate of 280 mm of right triangles with the given leg. Larger tail errors save time.
 double PlateHeight(double depth_mm, double edge_mm, const Emitter& emitter, double tail_error) {
   const ImplicitSurface surface =
       Surface(Plate(280, static_cast<int>(280 / edge_mm)), depth_mm, emitter, tail_error);
@@ -110,7 +108,7 @@ TEST_P(EmitterLaws, MovesWithTheSkull) {
 
 TEST_P(EmitterLaws, ScalesWithTheSkullAndItsDepth) {
   const TriMesh sphere = SphereMesh({0, 0, 0}, 40, 12);
-  const Similarity fourfold{4, Mat3::Identity(), Vec3::Zero()};  // a power of 2 rounds nothing
+  const Similarity fourfold{4, Mat3::Identity(), Vec3::Zero()};  // a power of 2 causes no round-off
   const ImplicitSurface small = Surface(sphere, 8, GetParam()),
                         large = Surface(Transformed(sphere, fourfold), 32, GetParam());
   Random random(4);
@@ -197,7 +195,7 @@ TEST(FlatEmitter, WithLinearDepthATriangleIsTheIntegralOfItsDepth) {
   }
 }
 
-// Over a plate whose depth rises by a tenth of the way: in each triangle the mean makes a step.
+// Over a plate whose depth rises with the slope 0.1; mean depths make a step at each triangle.
 TEST(FlatEmitter, WithLinearDepthASlopeHasNoSteps) {
   const TriMesh plate = Plate(160, 20);
   std::vector<double> depth;
@@ -294,7 +292,7 @@ TEST(ImplicitSurface, TrianglesWithoutDepthDoNotEmit) {
   EXPECT_LT(surface.Value({85, 50, 4}), 0);
 }
 
-TEST(ImplicitSurface, RefusesDepthsThatAreNone) {
+TEST(ImplicitSurface, RefusesInvalidDepths) {
   const TriMesh plate = Plate(10, 1);
   EXPECT_THROW(ImplicitSurface(plate, std::vector<double>(3, 5), {}), InputError);
   EXPECT_THROW(ImplicitSurface(plate, std::vector<double>(4, -1), {}), InputError);

@@ -74,7 +74,7 @@ TEST(Curvature, IsHowTheNormalTurnsAlongThePrincipalDirections) {
     const SurfaceFrame frame = surface.Frame(uv);
     Eigen::Matrix<double, 3, 2> tangents;
     tangents << frame.du, frame.dv;
-    const auto turn = [&](const Vec3& direction) {  // of the normal, per mm
+    const auto turn = [&](const Vec3& direction) {  // change of the normal per mm
       const double h = 1e-3;
       const Vec2 step = h * tangents.colPivHouseholderQr().solve(direction);
       return Vec3((surface.Normal(uv + step) - surface.Normal(uv - step)) / (2 * h));
@@ -105,7 +105,7 @@ TEST(Curvature, ScalesInverselyWithTheSurface) {
   EXPECT_NEAR(one->GaussianPerMm2(), 16 * four->GaussianPerMm2(), 1e-12);
 }
 
-// Surfaces without a frame somewhere: a point, a line, a pole (one row of vertices in one point).
+// Surfaces with places without a frame: a point, a line, a pole (a row of vertices in one point).
 HSplineSurface Degenerate(const std::function<Vec3(int i, int j)>& vertex) {
   const HSplineShape shape{.patches_u = 4, .patches_v = 4, .max_level = 1};
   ControlNet net{7, 7, {}};
@@ -117,7 +117,7 @@ HSplineSurface Degenerate(const std::function<Vec3(int i, int j)>& vertex) {
   return HSplineSurface(shape, net);
 }
 
-TEST(Curvature, DegenerateFramesAreToldAndNeverNaN) {
+TEST(Curvature, DegenerateFramesGiveNoCurvatureAndNoNaN) {
   for (const HSplineSurface& surface :
        {Degenerate([](int, int) { return Vec3(1, 2, 3); }),
         Degenerate([](int i, int j) { return Vec3(i + j, 2 * (i + j), 7); }),

@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 using testing::RandomSurface;
 using testing::SmoothSurface;
 
-// Level 0 seen in the mirror: (u,v) -> (1 - u, v), x -> -x.
+// Level 0 mirrored by (u,v) -> (1 - u, v), x -> -x.
 HSplineSurface MirroredLevelZero(const HSplineSurface& surface) {
   const HSplineShape& shape = surface.shape();
   ControlNet net = surface.Net(0);
@@ -89,7 +89,7 @@ TEST_P(FeatureLaws, BlendingOneAndZeroIsTheFirst) {
   EXPECT_TRUE(blend.warnings.empty());
 }
 
-TEST_P(FeatureLaws, BlendsAreLinearAndExtrapolationIsToldOf) {
+TEST_P(FeatureLaws, BlendsAreLinearAndExtrapolationGivesAWarning) {
   const std::vector<Feature> both = {ExtractFeature(Face(3), "one"),
                                      ExtractFeature(Face(4), "two")};
   const FeatureBlend blend = BlendFeatures("mix", both, std::vector<double>{0.25, 1.5});

@@ -129,8 +129,7 @@ TEST_P(HSplineLaws, RefinementKeepsTheShape) {
 TEST_P(HSplineLaws, AnEditTouchesTheFourPatchesOfItsParentLevelAndNothingElse) {
   const HSplineSurface before = RandomSurface(shape(), 5);
   HSplineSurface after = before;
-  // odd: it lies on a vertex of level 1, the centre of an overlay; near the seams where there are
-  // any
+  // odd: it lies on a vertex of level 1, the center of an overlay, near any seams
   const VertexId vertex{2, shape().ClosedU() ? 1 : 9, shape().ClosedV() ? 1 : 9};
   after.SetOffsets({{vertex, Vec3(0, 0, 5)}});
   const Vec2 center = ParameterOf(shape(), vertex);
@@ -143,7 +142,7 @@ TEST_P(HSplineLaws, AnEditTouchesTheFourPatchesOfItsParentLevelAndNothingElse) {
   for (int a = 0; a < 60; ++a) {
     for (int b = 0; b < 60; ++b) {
       const Vec2 uv((a + 0.5) / 60, (b + 0.5) / 60);
-      constexpr double kBorder = 1e-12;  // a border is of the patches on both sides
+      constexpr double kBorder = 1e-12;  // a border belongs to the patches on both sides
       const bool inside = apart(uv.x(), center.x(), shape().ClosedU()) < reach_u + kBorder &&
                           apart(uv.y(), center.y(), shape().ClosedV()) < reach_v + kBorder;
       const double moved = (after.Point(uv) - before.Point(uv)).norm();
@@ -230,7 +229,7 @@ TEST_P(HSplineLaws, DerivativesAgreeWithCentralDifferences) {
   }
 }
 
-TEST_P(HSplineLaws, DetailRidesAlongWithARigidMotionOfLevelZero) {
+TEST_P(HSplineLaws, DetailFollowsARigidMotionOfLevelZero) {
   const HSplineSurface before = RandomSurface(shape(), 8);
   const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   const Vec3 shift(10, -20, 30);
@@ -264,7 +263,7 @@ TEST_P(HSplineLaws, SettingANetBackChangesNoBit) {
   }
 }
 
-TEST_P(HSplineLaws, ANetThatIsSetIsTheNetThatIsGot) {
+TEST_P(HSplineLaws, ASetNetIsReadBack) {
   for (int level = 0; level <= shape().max_level; ++level) {
     HSplineSurface surface = RandomSurface(shape(), 10);
     const std::map<VertexId, Vec3> old = surface.Offsets();
@@ -308,7 +307,8 @@ TEST_P(HSplineLaws, TessellationLiesOnTheSurfaceAndIsConsistent) {
   EXPECT_EQ(edges.boundary,
             (shape().ClosedV() ? 0 : 2 * quads_u) + (shape().ClosedU() ? 0 : 2 * quads_v));
   EXPECT_EQ(edges.non_manifold + edges.inconsistent, 0);
-  if (shape().ClosedV()) {  // each edge has two triangles, and Euler's characteristic is a torus's
+  if (shape().ClosedV()) {  // each edge has two triangles, and the Euler characteristic is that of
+                            // a torus
     EXPECT_EQ(2 * t.mesh.points.size(), t.mesh.triangles.size());
   }
   EXPECT_GT(TriangleAreaVector(t.mesh, t.mesh.triangles[5]).dot(t.normals[t.mesh.triangles[5][0]]),
@@ -365,7 +365,7 @@ TEST(HSpline, AnOffsetIsKeptInTheFrameOfTheCoarserSurface) {
   }
 }
 
-TEST(HSpline, AVertexInfluencesMostItsParameter) {
+TEST(HSpline, AVertexHasItsLargestInfluenceAtItsGrevillePoint) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU, Closure::kPeriodicUv}) {
     const HSplineShape shape{.patches_u = 4, .patches_v = 5, .max_level = 1, .closure = closure};
     const int border_u = shape.ClosedU() ? 0 : 1, border_v = shape.ClosedV() ? 0 : 1;

@@ -32,7 +32,7 @@ std::vector<double> Array(const std::string& vtu, int n) {
   return {std::istream_iterator<double>(text), {}};
 }
 
-// The cubic that is 1 at k/3 and 0 at the other thirds.
+// The cubic with the value 1 at k/3 and 0 at the other multiples of 1/3.
 double Lagrange(int k, double t) {
   double product = 1;
   for (int other = 0; other < 4; ++other) {
@@ -53,7 +53,7 @@ int VtkIndex(int i, int j) {
   return i_end ? j - 1 + (i != 0 ? 2 : 6) + 4 : 12 + (i - 1) + 2 * (j - 1);
 }
 
-TEST(SurfaceExport, TheLagrangePatchesAreTheSurface) {
+TEST(FaceExport, TheLagrangePatchesAreTheSurface) {
   const HSplineSurface surface = RandomSurface(kShape, 1);
   const std::string vtu = SurfaceToVtu(surface);
   const PatchTree tree(surface);
@@ -74,7 +74,7 @@ TEST(SurfaceExport, TheLagrangePatchesAreTheSurface) {
   }
 }
 
-TEST(SurfaceExport, TheVtuIsAsVtkWantsIt) {
+TEST(FaceExport, TheVtuFollowsVtksFormat) {
   const HSplineSurface surface = RandomSurface(kShape, 2);
   const std::string vtu = SurfaceToVtu(surface);
   const std::size_t count = PatchTree(surface).leaves().size();
@@ -113,7 +113,7 @@ T At(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
-TEST(SurfaceExport, TheGlbHoldsTheMeshInMetresWithTheFaceTowardsZ) {
+TEST(FaceExport, TheGlbHoldsTheMeshInMetresWithTheFaceTowardsZ) {
   const Tessellation t = TessellateToChord(RandomSurface(kShape, 3), 0.3);
   const std::string glb = TessellationToGlb(t);
   ASSERT_EQ(glb.substr(0, 4), "glTF");
@@ -156,7 +156,7 @@ TEST(SurfaceExport, TheGlbHoldsTheMeshInMetresWithTheFaceTowardsZ) {
   }
 }
 
-TEST(SurfaceExport, AMeshThatGlTfCannotHoldIsRefused) {
+TEST(FaceExport, AMeshThatGlTfCannotHoldIsRefused) {
   EXPECT_THROW(TessellationToGlb({}), InputError);
   Tessellation t = TessellateToChord(RandomSurface(kShape, 4), 1);
   t.normals.pop_back();

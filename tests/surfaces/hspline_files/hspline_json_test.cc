@@ -87,7 +87,7 @@ TEST(HSplineJson, RefusesEveryOtherText) {
   }
 }
 
-TEST(HSplineJson, SaysOfWhatIsNoObjectWhatAnHSplineIs) {
+TEST(HSplineJson, ExplainsWhatAnHSplineIsIfTheTextIsNoObject) {
   for (const char* text : {"", " \n", "[1]", "ply\nformat ascii 1.0\n"}) {
     EXPECT_THAT(testing::WordsOf<IoError>([&] { HSplineFromJson(text, "a.json"); }),
                 ::testing::AllOf(::testing::StartsWith("a.json: not an H-spline: "),

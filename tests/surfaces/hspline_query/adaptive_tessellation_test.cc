@@ -19,7 +19,7 @@ using testing::RandomSurface;
 
 class ChordLaws : public ::testing::TestWithParam<HSplineShape> {};
 
-// The (u,v) of a triangle's corners, those on a seam moved next to the others.
+// The (u,v) of a triangle's corners; corners on a seam are moved next to the others.
 std::array<Vec2, 3> Corners(const Tessellation& t, const Triangle& triangle) {
   std::array<Vec2, 3> uv = {t.uv[triangle[0]], t.uv[triangle[1]], t.uv[triangle[2]]};
   for (const int axis : {0, 1}) {
@@ -52,7 +52,7 @@ TEST_P(ChordLaws, NoTriangleIsFurtherFromTheSurfaceThanTheChord) {
       }
     }
     EXPECT_LE(worst, chord);
-    EXPECT_GT(worst, chord / 20);  // not far finer than asked for
+    EXPECT_GT(worst, chord / 20);  // not much finer than requested
   }
 }
 
@@ -67,11 +67,11 @@ TEST_P(ChordLaws, IsWatertightAndFacesOutward) {
     border += (open_v && (uv.y() == 0 || uv.y() == 1)) || (open_u && (uv.x() == 0 || uv.x() == 1));
   }
   EXPECT_EQ(edges.boundary, border);
-  if (!open_v) {  // each edge has two triangles, and Euler's characteristic is a torus's
+  if (!open_v) {  // each edge has two triangles, and the Euler characteristic is that of a torus
     EXPECT_EQ(2 * t.mesh.points.size(), t.mesh.triangles.size());
   }
   EXPECT_EQ(ConnectedComponents(t.mesh).count, 1);
-  double area = 0;  // of the domain, covered once
+  double area = 0;  // the domain is covered once
   for (const Triangle& triangle : t.mesh.triangles) {
     const std::array<Vec2, 3> uv = Corners(t, triangle);
     const Vec2 a = uv[1] - uv[0], b = uv[2] - uv[0];
@@ -123,8 +123,7 @@ TEST(AdaptiveTessellation, DetailCostsTrianglesOnlyWhereItIs) {
   EXPECT_LT(TessellateToChord(surface, 0.1).mesh.triangles.size(), smooth + 2000);
 }
 
-// Neighbours that are split too come on top; a cell has two triangles or, beside finer ones, up to
-// eight.
+// Balancing may add cells. A cell has two triangles, or up to eight next to finer cells.
 TEST_P(ChordLaws, CellsAreCountedBeforeTheyAreMade) {
   const HSplineSurface surface = RandomSurface(GetParam(), 4);
   double before = 0;
@@ -141,7 +140,7 @@ TEST_P(ChordLaws, CellsAreCountedBeforeTheyAreMade) {
   EXPECT_THROW(TessellateToChord(surface, 1e-9), InputError);
 }
 
-TEST(AdaptiveTessellation, ChordsThatCannotBeAreRefused) {
+TEST(AdaptiveTessellation, InvalidChordsAreRefused) {
   const HSplineSurface surface = testing::SmoothSurface({.max_level = 1}, 1);
   EXPECT_THROW(TessellateToChord(surface, 0), InputError);
   EXPECT_THROW(TessellateToChord(surface, kNaN), InputError);

@@ -10,7 +10,7 @@ namespace {
 
 class EmitterCacheTest : public ::testing::Test {
  protected:
-  // Asks for some emitters at a corner; returns how many were evaluated.
+  // Gets some emitters at a corner and returns the number of evaluations.
   std::int64_t Ask(const GridIndex& corner, const std::vector<std::int32_t>& emitters) {
     std::vector<double> values(emitters.size(), kNaN), exact(emitters.size(), kNaN);
     std::int64_t evaluations = 0;
@@ -35,7 +35,7 @@ TEST_F(EmitterCacheTest, EvaluatesEachEmitterOnceAtACorner) {
   EXPECT_EQ(Ask({2, 1, 3}, {2}), 1);  // another column
 }
 
-// Around the slice from 2 to 3 in a grid of 8 cells these layers bound nodes: 0, 2, 3, 4, 8.
+// In a grid of 8 cells the layers 0, 2, 3, 4 and 8 bound nodes around the slice from 2 to 3.
 TEST_F(EmitterCacheTest, KeepsOneLayerOfEachDepthAndThatOfZero) {
   for (const int k : {0, 8, 4, 2, 3}) {
     EXPECT_EQ(Ask({4, 4, k}, {1, 2}), 2) << k;
@@ -43,10 +43,10 @@ TEST_F(EmitterCacheTest, KeepsOneLayerOfEachDepthAndThatOfZero) {
   for (const int k : {0, 8, 4, 2, 3}) {
     EXPECT_EQ(Ask({4, 4, k}, {1, 2}), 0) << k;
   }
-  EXPECT_EQ(Ask({4, 4, 5}, {1, 2}), 2);  // of depth 3, as 3 is
+  EXPECT_EQ(Ask({4, 4, 5}, {1, 2}), 2);  // layers 5 and 3 have depth 3
   EXPECT_EQ(Ask({4, 4, 3}, {1, 2}), 2);
   EXPECT_EQ(Ask({4, 4, 2}, {1, 2}), 0);
-  EXPECT_EQ(Ask({4, 4, 6}, {1, 2}), 2);  // of depth 2, as 2 is
+  EXPECT_EQ(Ask({4, 4, 6}, {1, 2}), 2);  // layers 6 and 2 have depth 2
   EXPECT_EQ(Ask({4, 4, 2}, {1, 2}), 2);
   EXPECT_EQ(Ask({4, 4, 4}, {1, 2}), 0);
 }

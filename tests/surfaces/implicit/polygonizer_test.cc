@@ -99,7 +99,8 @@ TEST(Polygonizer, EachOptimisationOfTheThesisSavesEvaluations) {
   EXPECT_GT(bounds.bound_evaluations, 0);
 }
 
-// Thesis 3.2.3. The corners' least is never below the ball's, so that no more boxes are looked at.
+// Thesis 3.2.3. The minimum at corners is never below the ball's bound, so that no more boxes are
+// visited.
 TEST(Polygonizer, TheThesissEmitterCacheSavesEvaluationsAndChangesNoBit) {
   const auto face = [](EmitterMinimum minimum) {
     const MinMaxOctree octree{.least_emission = 0.002, .minimum = minimum};
@@ -119,7 +120,7 @@ TEST(Polygonizer, TheThesissEmitterCacheSavesEvaluationsAndChangesNoBit) {
   EXPECT_LT(cached.counts.emitter_evaluations, 0.8 * double(corners.counts.emitter_evaluations));
 }
 
-TEST(Polygonizer, RefusesAGridThatIsNone) {
+TEST(Polygonizer, RefusesAnInvalidGrid) {
   const Skull skull = BumpySkull();
   const ImplicitSurface surface(skull.mesh, skull.depth_mm, {});
   for (const Polygonizer& polygonizer : kFaster) {
@@ -127,8 +128,8 @@ TEST(Polygonizer, RefusesAGridThatIsNone) {
   }
 }
 
-// Two balls far from each other, one of them within a shell that is open nowhere: four components.
-TEST_P(Agreement, NoComponentIsMissedWhereAllAreAsked) {
+// Two distant balls, one of them within a closed shell: four components.
+TEST_P(Agreement, NoComponentIsMissedIfAllAreRequested) {
   TriMesh mesh;
   for (const TriMesh& part : {SphereMesh({0, 0, 0}, 20, 14), SphereMesh({0, 0, 0}, 3, 6),
                               SphereMesh({45, 5, 3}, 6, 8), SphereMesh({1, 44, -9}, 1.5, 6)}) {
@@ -180,7 +181,7 @@ class Bounds : public ::testing::TestWithParam<Emitter> {
     }
   }
 
-  int at_corner_ = 0;  // boxes whose least is at a corner
+  int at_corner_ = 0;  // boxes with the minimum at a corner
 };
 INSTANTIATE_TEST_SUITE_P(All, Bounds, ::testing::ValuesIn(kEmitters));
 INSTANTIATE_TEST_SUITE_P(Broken, Bounds, ::testing::Values(Emitter(FlatEmitter{4.5})));
@@ -200,7 +201,7 @@ TEST_P(Bounds, HoldEverywhereInABox) {
   EXPECT_GT(at_corner_, 20);
 }
 
-// The thesis's maximum at the closest point of the box is 0 here.
+// The thesis's maximum, at the closest point of the box, is 0 here.
 TEST_P(Bounds, HoldWhereTheClosestPointOfTheBoxIsBehindTheTriangle) {
   Random random(12);
   const TriMesh triangle{{{0.1, 0, -0.1}, {0, 0.1, 0}, {-0.1, -0.1, 0.1}}, {{0, 1, 2}}};

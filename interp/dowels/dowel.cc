@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 
 namespace semblance {
 
@@ -14,5 +14,4 @@ std::string WithoutSide(std::string_view site) {
   const std::size_t suffix = SideOfSite(site) == Side::kMidline ? 0 : 2;
   return std::string(site.substr(0, site.size() - suffix));
 }
-
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/dowels/network_insertion.h"
+#include "interp/dowels/dowel_network.h"
 
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ double AreaOf(const DowelScene& scene) {
   return sum.z();
 }
 
-// On a plane the three areas of a split one interpolate as the one did.
+// On a plane the three parts of a split area interpolate like the whole area.
 TEST(InsertIntoNetwork, OnAPlaneTheInterpolatedDepthChangesNothing) {
   const Vec3 up(0, 0, 1);
   for (const Vec3& base : {Vec3(20, 10, 0), Vec3(20, 20, 0), Vec3(20, 5, 0), Vec3(6, 5.5, 0)}) {
@@ -59,9 +59,9 @@ TEST(InsertIntoNetwork, OnAPlaneTheInterpolatedDepthChangesNothing) {
 TEST(InsertIntoNetwork, AnEdgeIsSplitOnBothSides) {
   DowelScene scene = FlatScene();
   EXPECT_EQ(Insert(scene, {20, 20, 0}, {0, 0, 1}, 5), Insertion::kInside);
-  EXPECT_EQ(scene.network.areas.size(), 4u);  // the diagonal is of both areas
+  EXPECT_EQ(scene.network.areas.size(), 4u);  // the diagonal belongs to both areas
   EXPECT_EQ(Insert(scene, {20, 5, 0}, {0, 0, 1}, 5), Insertion::kInside);
-  EXPECT_EQ(scene.network.areas.size(), 5u);  // a side is of one
+  EXPECT_EQ(scene.network.areas.size(), 5u);  // a side belongs to one area
 }
 
 TEST(InsertIntoNetwork, OutsideTheNearestEdgeGetsAnArea) {
@@ -76,8 +76,8 @@ TEST(InsertIntoNetwork, OutsideTheNearestEdgeGetsAnArea) {
   EXPECT_EQ(depth[1], DepthsAt(Barycentric{}, FlatScene(), {{20, 10, 0}}, {0, 0, 1})[0]);
 }
 
-// The law of an inserted dowel, for schemes that pass through the dowels: with any depth it has its
-// own at its base, and no other dowel's changes.
+// A law for interpolating schemes: the inserted dowel's base gets its depth, and the depths at all
+// other bases stay.
 TEST(InsertIntoNetwork, ADowelsOwnDepthHoldsAtItsBaseAndNoOtherChanges) {
   const DepthScheme schemes[] = {Barycentric{}, Nearest{},          InverseDistance{},
                                  RadialBasis{}, NaturalNeighbour{}, NetworkSpline{}};
@@ -99,7 +99,7 @@ TEST(InsertIntoNetwork, ADowelsOwnDepthHoldsAtItsBaseAndNoOtherChanges) {
   }
 }
 
-TEST(InsertIntoNetwork, OnAnotherBaseThereIsNoRoom) {
+TEST(InsertIntoNetwork, OnAnotherBaseNothingIsInserted) {
   DowelScene scene = DomeScene();
   const std::vector<std::array<int, 3>> areas = scene.network.areas;
   EXPECT_EQ(Insert(scene, scene.dowels[3].base, {0, -1, 0}, 5), Insertion::kNone);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/schemes/network_spline.h"
+#include "interp/schemes/network_schemes.h"
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
@@ -10,10 +10,10 @@
 namespace semblance {
 namespace {
 
-using Edge = std::array<int, 2>;  // dowels, the lower first
+using Edge = std::array<int, 2>;  // dowels, lower index first
 using Tangents = Eigen::Matrix<double, 3, 2>;
 
-std::set<Edge> EdgesOf(const DowelNetwork& network) {
+std::set<Edge> CollectEdges(const DowelNetwork& network) {
   std::set<Edge> edges;
   for (const auto& area : network.areas) {
     for (int k = 0; k < 3; ++k) {
@@ -24,21 +24,21 @@ std::set<Edge> EdgesOf(const DowelNetwork& network) {
   return edges;
 }
 
-// Two unit vectors across the direction.
-Tangents TangentsOf(const Vec3& direction) {
+// Two unit vectors perpendicular to the direction and to each other.
+Tangents MakeTangents(const Vec3& direction) {
   Tangents tangents;
   tangents.col(0) = direction.unitOrthogonal();
   tangents.col(1) = direction.cross(tangents.col(0));
   return tangents;
 }
 
-// The normal equations of the network's least bending. With slopes a, b at the ends of an edge of
-// length l, and the mean slope m, the integral is 4 / l (a^2 + a b + b^2 - 3 m (a + b) + 3 m^2).
+// The normal equations of least bending. For an edge of length l with slopes a and b at its ends
+// and the mean slope m, the integral is 4 / l (a^2 + a b + b^2 - 3 m (a + b) + 3 m^2).
 class BendingEquations {
  public:
   explicit BendingEquations(std::span<const Dowel> dowels) : dowels_(dowels) {
     for (const Dowel& dowel : dowels) {
-      tangents_.push_back(TangentsOf(dowel.direction));
+      tangents_.push_back(MakeTangents(dowel.direction));
     }
     right_ = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(dowels.size()));
   }
@@ -47,7 +47,7 @@ class BendingEquations {
     const Vec3 along = dowels_[edge[1]].base - dowels_[edge[0]].base;
     const double length = along.norm();
     const double rise = dowels_[edge[1]].depth_mm - dowels_[edge[0]].depth_mm;
-    std::array<Eigen::Vector2d, 2> slope;  // of a gradient, in its tangents
+    std::array<Eigen::Vector2d, 2> slope;  // slope along the edge per unit of each tangent
     for (int k = 0; k < 2; ++k) {
       slope[k] = tangents_[edge[k]].transpose() * along / length;
       right_.segment<2>(2 * edge[k]) += 12 * rise / (length * length) * slope[k];
@@ -61,9 +61,10 @@ class BendingEquations {
     }
   }
 
-  // In space, one per dowel. A direction in which no edge of a dowel goes gets no slope.
+  // The gradients in space, one per dowel. The slope is 0 in a direction in which the dowel has no
+  // edge.
   std::vector<Vec3> Gradients() {
-    constexpr double kRidge = 1e-10;  // relative: decides only what no edge decides
+    constexpr double kRidge = 1e-10;  // relative; affects only directions without edges
     for (Eigen::Index i = 0; i < right_.size(); ++i) {
       entries_.emplace_back(i, i, kRidge * largest_);
     }
@@ -94,14 +95,14 @@ class BendingEquations {
   double largest_ = 0;
 };
 
-// An edge's depth as a function of all space, with continuous first derivatives: the cubic at the
-// foot of p on the edge, the dowels' own linear functions beyond its ends, and across the edge the
-// slope of the gradients, which pass into each other.
+// An edge's depth as a function of space with continuous first derivatives: the cubic at p's foot
+// on the edge, the dowels' linear functions beyond its ends, and perpendicular to the edge a slope
+// that changes smoothly from one gradient to the other.
 struct EdgeDepth {
-  Vec3 base, along;  // along: to the other base
-  double square;     // of its length
+  Vec3 base, along;  // along: vector to the other base
+  double square;     // squared length
   double depth_mm, rise_mm;
-  double slope_0, slope_1;  // of the cubic at its ends, in mm for the whole edge
+  double slope_0, slope_1;  // slopes of the cubic at its ends, mm per whole edge
   Vec3 gradient_0, gradient_change;
 
   double At(const Vec3& p) const {
@@ -128,8 +129,8 @@ EdgeDepth MakeEdgeDepth(const Dowel& a, const Dowel& b, const Vec3& gradient_a,
           .gradient_change = gradient_b - gradient_a};
 }
 
-// Of each area the three edges, number k opposite corner k. An edge starts at its lower dowel for
-// both its areas, so that they agree to the bit.
+// The three edges of an area, number k opposite corner k. An edge starts at its lower dowel in both
+// its areas, so that the areas agree to the bit.
 using AreaEdges = std::array<EdgeDepth, 3>;
 
 std::vector<AreaEdges> MakeAreaEdges(const DepthInput& input, const std::vector<Vec3>& gradients) {
@@ -146,7 +147,7 @@ std::vector<AreaEdges> MakeAreaEdges(const DepthInput& input, const std::vector<
 }
 
 double Blend(const AreaEdges& edges, const Vec3& w, const Vec3& p) {
-  constexpr double kAtDowel = 1e-24;  // there all edges agree, and the weights are 0 / 0
+  constexpr double kAtDowel = 1e-24;  // at a dowel all edges agree and the weights are 0 / 0
   double sum = 0, total = 0;
   for (int k = 0; k < 3; ++k) {
     const double product = w[(k + 1) % 3] * w[(k + 2) % 3];
@@ -163,12 +164,24 @@ double Blend(const AreaEdges& edges, const Vec3& w, const Vec3& p) {
 
 }  // namespace
 
+DepthField InterpolateDepth(const Barycentric& options, const DepthInput& input,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  const std::vector<DowelArea> areas = DowelAreas(Barycentric::kName, input);
+  return AssignInAreas(
+      areas, options.distance, options.max_angle_deg, input, run,
+      [&](const AreaPoint& in, const Vec3&) {
+        const auto& [a, b, c] = in.area->dowels;
+        return in.weights.dot(
+            Vec3(input.dowels[a].depth_mm, input.dowels[b].depth_mm, input.dowels[c].depth_mm));
+      });
+}
 DepthField InterpolateDepth(const NetworkSpline& options, const DepthInput& input,
                             const RunContext& run) {
   CheckDepthInput(input);
   const std::vector<DowelArea> areas = DowelAreas(NetworkSpline::kName, input);
   BendingEquations bending(input.dowels);
-  for (const Edge& edge : EdgesOf(input.network)) {
+  for (const Edge& edge : CollectEdges(input.network)) {
     bending.Add(edge);
   }
   const std::vector<AreaEdges> edges = MakeAreaEdges(input, bending.Gradients());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/stacking/sd_by_distance.h"
+#include "interp/stacking/leave_out.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 namespace semblance {
 namespace {
 
-// Errors of its own form are found again.
+// Errors that follow the law give back its scale.
 TEST(SdByDistance, FindsTheScaleOfItsOwnForm) {
   Random random(2);
   std::vector<double> errors, distances;
