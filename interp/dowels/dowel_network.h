@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The dowel network (thesis def. 2.3): triples of dowels that form areas, and the insertion of
-// further dowels.
+// The dowel network (thesis def. 2.3): triples of dowels that form areas, the insertion of
+// further dowels, and the removal of dowels.
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <span>
 #include <string>
 #include <vector>
@@ -40,5 +41,24 @@ enum class Insertion {
 // The depths at the bases of all other dowels stay the same. Throws InputError as DowelAreas does
 // for areas that are not sound.
 Insertion InsertIntoNetwork(std::span<const Dowel> dowels, int index, DowelNetwork& network);
+
+// Indices of dowels that are left out together.
+using Folds = std::vector<std::vector<std::size_t>>;
+
+// Some of the dowels, with their network.
+struct ShownDowels {
+  std::vector<Dowel> dowels;
+  DowelNetwork network;
+
+  // The distance from a point to the nearest dowel.
+  double NearestTo_mm(const Vec3& p) const;
+};
+
+// Removes the fold's dowels from the network. If a removed dowel was inside the network, its
+// neighbours are joined by new areas across the gap, as if it had never been placed. The chosen fan
+// from one neighbour is the one with the largest minimum angle. At the border, or if no fan is
+// sound, the dowel's areas are removed without replacement.
+ShownDowels LeaveOutDowels(std::span<const Dowel> dowels, const DowelNetwork& network,
+                           const std::vector<std::size_t>& fold);
 
 }  // namespace semblance

@@ -169,7 +169,7 @@ CrossValidation CrossValidate(const DepthScheme& scheme, const OutsideRule& rule
   std::vector<std::vector<LeftOut>> left_out(folds.size());
   CrossValidation result;
   for (std::size_t f = 0; f < folds.size(); ++f) {
-    const ShownDowels shown = LeaveOutDowels(input, folds[f]);
+    const ShownDowels shown = LeaveOutDowels(input.dowels, input.network, folds[f]);
     for (std::size_t k = 0; k < folds[f].size(); ++k) {
       const Dowel& dowel = input.dowels[folds[f][k]];
       LeftOut out = Compared(dowel, fields[f], k);
@@ -194,7 +194,7 @@ DepthField WithStatedSd(DepthField field, const CrossValidation& known, const De
   if (known.own_sd) {
     return field;
   }
-  const ShownDowels all = LeaveOutDowels(input, {});
+  const ShownDowels all = LeaveOutDowels(input.dowels, input.network, {});
   ForEachVertex(input, run, [&](std::size_t i) {
     if (std::isfinite(field.depth_mm[i])) {
       field.sd_mm[i] = known.sd.At(all.NearestTo_mm(input.skull.points[i]));

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "interp/dowels/left_out_dowels.h"
+#include "interp/dowels/dowel_network.h"
 #include "interp/evaluation/scores.h"
 #include "interp/interpolate_depth.h"
 #include "interp/schemes/outside_rule.h"

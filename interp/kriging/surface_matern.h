@@ -2,14 +2,19 @@
 // Tissue depth as a Gaussian process along the bone, with a standard deviation.
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
+#include <string>
 #include <string_view>
+#include <vector>
 
 #include "interp/dowels/depth_input.h"
 #include "interp/dowels/dowel_samples.h"
 #include "interp/kriging/depth_mean.h"
 
 namespace semblance {
+
+class ReducedMatern;  // on_surface/matern_field.h
 
 struct SurfaceMatern {
   static constexpr std::string_view kName = "surface_matern";
@@ -86,10 +91,42 @@ void Fields(Visitor& visit, SurfaceMatern& o) {
 // measurement and the uncertainty of length and signal. It is NaN if there are no more dowels than
 // factors of the mean and signal_mm is not given. Length and signal, if not given, maximise the
 // restricted likelihood times the length's prior, within a factor of 12 of the prior's median
-// (surface_matern_likelihood.h); of more than 60 dowels it uses 60 that lie far apart. kNotFacing
+// (FitHyper below); of more than 60 dowels it uses 60 that lie far apart. kNotFacing
 // as in AssignWhereFacing. Throws InputError as CheckDepthInput and MeanRegressors do, or if the
 // skull has no triangle.
 DepthField InterpolateDepth(const SurfaceMatern& options, const DepthInput& input,
                             const RunContext& run);
+
+// The data of a field: n dowels.
+struct SurfaceMaternData {
+  Eigen::VectorXd depth_mm;    // n
+  Eigen::VectorXd nugget_mm2;  // n; variance of each depth, 0 if certain
+  Eigen::MatrixXd regressors;  // n x q; regressors of the mean
+};
+
+struct SurfaceMaternHyper {
+  double length_mm = 1;
+  double signal_mm = 1;
+  double nugget_mm = 0;
+  std::vector<std::string> at_end = {};  // DepthProcess::at_end
+};
+
+// The values of kappa^2 at which a search over lengths needs exact correlations: eight over the
+// range of lengths, or the one that the options fix.
+std::vector<double> SearchPoles(const SurfaceMatern& options);
+
+// The cost to minimise: the restricted deviance of depths with the covariance signal^2 R(length) +
+// nugget, where R are the correlations, plus the length's prior. logs: logarithms of length, signal
+// and nugget. gradient: may be null.
+double SurfaceMaternCost(const SurfaceMatern& options, const SurfaceMaternData& data,
+                         const ReducedMatern& correlations, const Eigen::VectorXd& logs,
+                         Eigen::VectorXd* gradient);
+
+// Minimises that cost by FindLogs. The length stays within a factor of 12 (e^2.5) of the prior's
+// median, the signal within 1/30 to 10 times the depths' spread (or more, see FindLogs), and the
+// nugget within 1/100 to 1 times the spread. Values that the options fix are kept. Throws Cancelled
+// if stopped.
+SurfaceMaternHyper FitHyper(const SurfaceMatern& options, const SurfaceMaternData& data,
+                            const ReducedMatern& correlations, const RunContext& run);
 
 }  // namespace semblance

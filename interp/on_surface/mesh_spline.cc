@@ -316,7 +316,7 @@ std::vector<DepthField> MeshSplineLeftOut(const MeshSpline& spline, std::string_
   std::vector<DepthField> fields;
   for (const std::vector<std::size_t>& fold : folds) {
     run.ThrowIfStopped();
-    const ShownDowels shown = LeaveOutDowels(input, fold);
+    const ShownDowels shown = LeaveOutDowels(input.dowels, input.network, fold);
     const std::vector<DepthSample> shown_samples = DepthSamples(shown.dowels);
     TriMesh bases;
     std::vector<Vec3> directions;

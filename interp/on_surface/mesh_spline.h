@@ -6,8 +6,8 @@
 #include <string_view>
 #include <vector>
 
+#include "interp/dowels/dowel_network.h"
 #include "interp/dowels/dowel_samples.h"
-#include "interp/dowels/left_out_dowels.h"
 
 namespace semblance {
 

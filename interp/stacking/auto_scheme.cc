@@ -84,7 +84,8 @@ bool CanBeTested(const SingleScheme& scheme, const DepthInput& input) {
   return fewest == 1 ||  // CheckFolds ensures one
          std::ranges::all_of(
              FoldsFor(MakeInterpolator(scheme), input.dowels), [&](const auto& fold) {
-               return DepthSamples(LeaveOutDowels(input, fold).dowels).size() >= fewest;
+               return DepthSamples(LeaveOutDowels(input.dowels, input.network, fold).dowels)
+                          .size() >= fewest;
              });
 }
 
@@ -149,7 +150,8 @@ Mixture Choose(const AutoScheme& options, const DepthInput& input, const RunCont
   }
   std::vector<double> distances;
   for (std::size_t i = 0; i < shown.dowels.size(); ++i) {
-    distances.push_back(LeaveOutDowels(tested, {i}).NearestTo_mm(shown.dowels[i].base));
+    distances.push_back(
+        LeaveOutDowels(shown.dowels, shown.network, {i}).NearestTo_mm(shown.dowels[i].base));
   }
   const Eigen::VectorXd importance = ImportanceAt(distances);
   const bool averages = options.takes == AutoTakes::kAverage;

@@ -86,7 +86,7 @@ std::vector<DepthField> OneByOne(const Interpolator& scheme, const DepthInput& i
   std::vector<DepthField> fields(folds.size());
   ParallelFor(folds.size(), run.threads, 1, [&](std::size_t f) {
     run.ThrowIfStopped();
-    const ShownDowels shown = LeaveOutDowels(input, folds[f]);
+    const ShownDowels shown = LeaveOutDowels(input.dowels, input.network, folds[f]);
     fields[f] = scheme.needs_surface
                     ? AtCorners(scheme, input, shown, folds[f], corners, of_fold)
                     : Interpolated(scheme, Bases(input, folds[f]).Given(shown), of_fold);
@@ -156,9 +156,9 @@ std::vector<DepthField> LeaveOut(const Interpolator& scheme, const OutsideRule& 
   RunContext silent;
   silent.stop_token = run.stop_token;
   for (std::size_t f = 0; f < folds.size(); ++f) {
-    fields[f] =
-        ApplyOutsideRule(rule, Bases(input, folds[f]).Given(LeaveOutDowels(input, folds[f])),
-                         std::move(fields[f]), silent);
+    fields[f] = ApplyOutsideRule(
+        rule, Bases(input, folds[f]).Given(LeaveOutDowels(input.dowels, input.network, folds[f])),
+        std::move(fields[f]), silent);
   }
   return fields;
 }

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "interp/dowels/left_out_dowels.h"
+#include "interp/dowels/dowel_network.h"
 #include "interp/schemes/outside_rule.h"
 #include "interp/stacking/single_scheme.h"
 #include "surfaces/base/geometry.h"

@@ -13,7 +13,7 @@
 #include "surfaces/base/lower_case.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/hspline/patch_tree.h"
-#include "surfaces/hspline_query/adaptive_tessellation.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/glb.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/vtk_xml.h"

@@ -3,9 +3,12 @@
 // bumps at three scales.
 #pragma once
 
+#include <fmt/format.h>
+
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "fitting/problem/fit_target.h"
@@ -205,6 +208,24 @@ inline HSplineSurface PlainStart(const HSplineShape& shape) {
     }
   }
   return HSplineSurface(shape, net);
+}
+
+// Writes points to fit as the text of a table.
+inline std::string PlainCsv(const FitTarget& target) {
+  std::string csv = "x,y,z\n";
+  for (const FitPoint& p : target.points) {
+    csv += fmt::format("{},{},{}\n", p.position.x(), p.position.y(), p.position.z());
+  }
+  return csv;
+}
+
+inline std::string UvCsv(const FitTarget& target) {
+  std::string csv = "x,y,z,u,v\n";
+  for (const FitPoint& p : target.points) {
+    csv += fmt::format("{},{},{},{},{}\n", p.position.x(), p.position.y(), p.position.z(), p.uv.x(),
+                       p.uv.y());
+  }
+  return csv;
 }
 
 }  // namespace semblance::testing

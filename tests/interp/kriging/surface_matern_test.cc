@@ -11,7 +11,6 @@
 
 #include "interp/interpolate_depth.h"
 #include "interp/kriging/gaussian_regression.h"
-#include "interp/kriging/surface_matern_likelihood.h"
 #include "interp/on_surface/bone_geometry.h"
 #include "interp/on_surface/coarse_surface.h"
 #include "surfaces/base/error.h"

@@ -237,7 +237,7 @@ TEST(MeshSplines, LeftOutAreAsIfTheDowelHadNotBeenThere) {
       const auto fields = InterpolateLeftOut(scheme, scene.Input(), folds, RunContext{});
       ASSERT_EQ(fields.size(), folds.size());
       for (std::size_t f = 0; f < folds.size(); ++f) {
-        const ShownDowels shown = LeaveOutDowels(scene.Input(), folds[f]);
+        const ShownDowels shown = LeaveOutDowels(scene.dowels, scene.network, folds[f]);
         const DepthField whole = InterpolateDepth(
             scheme, {scene.skull, scene.normals, shown.dowels, shown.network}, RunContext{});
         for (std::size_t k = 0; k < folds[f].size(); ++k) {

@@ -16,7 +16,7 @@
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
-#include "surfaces/hspline_query/adaptive_tessellation.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
 #include "tests/testing/scratch_folder.h"

@@ -24,7 +24,6 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/bent_sheets.h"
 #include "tests/testing/closed_shapes.h"
-#include "tests/testing/point_csv.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/stone.h"

@@ -9,7 +9,7 @@
 #include "surfaces/hspline/hspline_surface.h"
 #include "surfaces/hspline_files/face_export.h"
 #include "surfaces/hspline_files/hspline_json.h"
-#include "surfaces/hspline_query/adaptive_tessellation.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
 #include "tests/testing/program_call.h"

@@ -21,7 +21,6 @@
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
-#include "tests/testing/point_csv.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"

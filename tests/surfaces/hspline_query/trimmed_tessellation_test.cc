@@ -11,7 +11,7 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
-#include "surfaces/hspline_query/adaptive_tessellation.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "tests/testing/splines.h"
 

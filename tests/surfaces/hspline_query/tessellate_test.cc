@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/hspline_query/adaptive_tessellation.h"
+#include "surfaces/hspline_query/tessellate.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,6 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/hspline_query/surface_cells.h"
-#include "surfaces/hspline_query/tessellate.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
