@@ -358,7 +358,7 @@ TEST(Barycentric, NeedsAnArea) {
   scene.network.areas.clear();
   EXPECT_EQ(ErrorOf(scene),
             "dowel network: there is no area, but barycentric depth needs at least one; place the "
-            "dowels of an area, or use scheme nearest or mean");
+            "dowels of an area, or use the scheme nearest or mean");
 }
 
 }  // namespace

@@ -153,7 +153,7 @@ TEST(NetworkSpline, NeedsAnArea) {
   } catch (const InputError& e) {
     EXPECT_STREQ(e.what(),
                  "dowel network: there is no area, but network_spline depth needs at least one; "
-                 "place the dowels of an area, or use scheme nearest or mean");
+                 "place the dowels of an area, or use the scheme nearest or mean");
   }
 }
 
