@@ -17,7 +17,7 @@
 #include "fitting/solve/auto_weight.h"
 #include "fitting/solve/space_solve.h"
 #include "surfaces/base/error.h"
-#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline/feature.h"
 
 namespace semblance {
 namespace {

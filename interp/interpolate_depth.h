@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a few depths to a depth at every vertex of a skull. A new scheme is one options struct with
-// its overload of InterpolateDepth in a file of its own, and one entry of SingleScheme.
+// Interpolates a few measured depths to a depth at every vertex of a skull. A new scheme needs an
+// options struct, an overload of InterpolateDepth, and an entry in SingleScheme.
 #pragma once
 
 #include <cstddef>
@@ -13,29 +13,29 @@
 
 namespace semblance {
 
-// Each scheme by itself, then what is made of several, and last what is no scheme.
+// All choices: the single schemes, the mixture of several, and a map in place of a scheme.
 template <class... Single>
 std::variant<Single..., AutoScheme, DepthMap> WithTheRest(const std::variant<Single...>&);
 using DepthScheme = decltype(WithTheRest(std::declval<SingleScheme>()));
 
-// One entry per vertex. Where the status is kAssigned the depth is finite and within the range of
-// the dowels' depths (without a scheme's `clamp`: above 0; depth_map's are the map's); elsewhere it
-// is NaN, for an OutsideRule to fill. The result does not depend on run.threads nor on the order of
-// the dowels (beyond rounding). Throws InputError where the scheme cannot use the input, Cancelled
-// if stopped.
+// Interpolates the depths. At vertices with status kAssigned the depth is finite and within the
+// range of the dowels' depths (without a scheme's `clamp`: above 0; for depth_map: the map's
+// depth). Elsewhere it is NaN, for an OutsideRule to fill. The result does not depend on
+// run.threads, nor on the order of the dowels except for round-off. Throws InputError if the scheme
+// cannot use the input, and Cancelled if stopped.
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                             const RunContext& run);
 
-// Does the scheme work along the skull's surface, so that points alone do not do?
+// Returns true if the scheme works along the skull's surface and needs its triangles.
 bool NeedsSurface(const DepthScheme& scheme);
 
-// Does the scheme vary around DepthInput::expected?
+// Returns true if the scheme's mean is DepthInput::expected.
 bool NeedsExpected(const DepthScheme& scheme);
 
-// Does the scheme work on the dowel network, so that one without an area will not do?
+// Returns true if the scheme needs a dowel network with at least one area.
 bool NeedsNetwork(const DepthScheme& scheme);
 
-// The fewest dowels, at places of their own, with which the scheme can be asked: 1 of most.
+// The smallest number of dowels at distinct places that the scheme needs; 1 for most schemes.
 std::size_t FewestDowels(const DepthScheme& scheme);
 
 }  // namespace semblance

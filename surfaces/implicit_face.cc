@@ -5,17 +5,152 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/implicit/project_onto.h"
-#include "surfaces/implicit/start_cells.h"
+#include "surfaces/base/parallel.h"
 #include "surfaces/implicit/trim_to_border.h"
+#include "surfaces/marching/edge_intersections.h"
 
 namespace semblance {
 namespace {
 
-// In a grid that is made larger until the surface fits into it.
+// The emitting vertex of the shell that lies furthest along a direction; -1 if none emits.
+int ExtremePoint(const TriMesh& shell, std::span<const double> depth_mm, const Vec3& direction) {
+  int extreme = -1;
+  for (int v = 0; v < static_cast<int>(shell.points.size()); ++v) {
+    const bool further =
+        extreme < 0 || shell.points[v].dot(direction) > shell.points[extreme].dot(direction);
+    extreme = std::isfinite(depth_mm[v]) && further ? v : extreme;
+  }
+  return extreme;
+}
+
+// The grid corner nearest to a point, but not on the grid's border.
+GridIndex InnerCorner(const SampleGrid& grid, const Vec3& p) {
+  GridIndex at;
+  for (int a = 0; a < 3; ++a) {
+    at[a] = std::clamp(static_cast<int>(std::lround((p[a] - grid.origin[a]) / grid.cell_mm[a])), 1,
+                       grid.counts[a] - 2);
+  }
+  return at;
+}
+
+struct LastCrossing {
+  bool leaves_grid = false;
+  int lower = -1;  // lower corner, along the axis, of the outermost crossed edge; -1: none
+};
+
+// Finds the last sign change of the field along a line of corners, in steps of 1 or -1 along an
+// axis.
+LastCrossing FindLastCrossing(const ScalarField& field, const SampleGrid& grid, GridIndex at,
+                              int axis, int step) {
+  LastCrossing last;
+  for (; at[axis] > 0 && at[axis] + 1 < grid.counts[axis]; at[axis] += step) {
+    const bool inside = field(grid.Corner(at)) > 0;
+    if (last.leaves_grid && !inside) {
+      last.lower = step > 0 ? at[axis] - 1 : at[axis];
+    }
+    last.leaves_grid = inside;
+  }
+  return last;
+}
+
+// Makes a grid of cubic cells: `resolution` cells along the longest side of the shell plus its
+// largest depth, and a margin of `margin` times the depth on each side.
+SampleGrid GridAround(const TriMesh& shell, double depth_mm, int resolution, double margin) {
+  const Box3 box = Bounds(shell);
+  SampleGrid grid;
+  grid.cell_mm = Vec3::Constant((box.sizes().maxCoeff() + 2 * depth_mm) / resolution);
+  grid.origin = box.min() - Vec3::Constant(margin * depth_mm) - 2 * grid.cell_mm;
+  for (int axis = 0; axis < 3; ++axis) {
+    grid.counts[axis] = static_cast<int>(std::ceil((box.sizes()[axis] + 2 * margin * depth_mm) /
+                                                   grid.cell_mm[axis])) +
+                        5;
+  }
+  return grid;
+}
+
+// Goes outward from the six emitting vertices that lie furthest along the axes, and appends the
+// cells of the last crossings. Returns false if the field is positive at the grid's border, that is
+// if the surface leaves the grid.
+bool FindStartCells(const TriMesh& shell, std::span<const double> depth_mm,
+                    const ScalarField& field, const SampleGrid& grid,
+                    std::vector<StartCell>& starts) {
+  constexpr double kOutward = 0.4;  // of the depth; such a point lies inside the surface
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const int step : {-1, 1}) {
+      const Vec3 direction = step * Vec3::Unit(axis);
+      const int extreme = ExtremePoint(shell, depth_mm, direction);
+      const Vec3 inside = shell.points[extreme] + kOutward * depth_mm[extreme] * direction;
+      GridIndex at = InnerCorner(grid, inside);
+      const LastCrossing last = FindLastCrossing(field, grid, at, axis, step);
+      if (last.leaves_grid) {
+        return false;
+      }
+      if (last.lower >= 0) {
+        at[axis] = last.lower;
+        starts.push_back({grid.Index(at), EdgeBits(1 << EdgeFrom(0, axis))});
+      }
+    }
+  }
+  return true;
+}
+
+// The surface point nearest to p along +-normal within reach_mm, or p if there is none.
+Vec3 MoveToSurface(const ImplicitSurface& surface, const Vec3& p, const Vec3& normal,
+                   double reach_mm) {
+  constexpr int kSteps = 8;
+  const EdgeSearchOptions search{.method = EdgeSearch::kRegulaFalsi, .tolerance = 1e-3};
+  double from = surface.Flattened(p);
+  const Vec3 step = (from > 0 ? 1 : -1) * reach_mm / kSteps * normal;
+  for (int n = 0; n < kSteps; ++n) {
+    const Vec3 start = p + n * step;
+    const double to = surface.Flattened(start + step);
+    if ((from > 0) != (to > 0)) {
+      std::int64_t evaluations = 0;
+      return start + SearchCrossing(
+                         from, to, search,
+                         [&](double t) { return surface.Flattened(start + t * step); },
+                         evaluations) *
+                         step;
+    }
+    from = to;
+  }
+  return p;
+}
+
+// Restores the corners of triangles that turned by a right angle or more, until no triangle has.
+void RestoreTurned(const TriMesh& before, TriMesh& mesh) {
+  bool turned = true;
+  while (turned) {
+    turned = false;
+    for (const Triangle& t : mesh.triangles) {
+      if (TriangleAreaVector(mesh, t).dot(TriangleAreaVector(before, t)) <= 0) {
+        for (const std::int32_t v : t) {
+          turned |= mesh.points[v] != before.points[v];
+          mesh.points[v] = before.points[v];
+        }
+      }
+    }
+  }
+}
+
+// Moves each vertex along its normal onto the surface, by at most reach_mm. A vertex stays if the
+// surface is further away, or if a triangle would turn by a right angle or more.
+void ProjectOnto(const ImplicitSurface& surface, double reach_mm, const RunContext& context,
+                 TriMesh& mesh) {
+  const TriMesh before = mesh;
+  const std::vector<Vec3> normals = VertexNormals(before);
+  ParallelFor(mesh.points.size(), context.threads, 64, [&](std::size_t v) {
+    mesh.points[v] = MoveToSurface(surface, before.points[v], normals[v], reach_mm);
+  });
+  RestoreTurned(before, mesh);
+}
+
+// Polygonises in ever larger grids until the surface fits.
 void PolygonizeOutermost(const TriMesh& shell, std::span<const double> depth_mm,
                          const ImplicitSurface& surface, const ImplicitFaceOptions& options,
                          const RunContext& context, ImplicitFace& face) {
@@ -37,8 +172,8 @@ void PolygonizeOutermost(const TriMesh& shell, std::span<const double> depth_mm,
     return;
   }
   throw InputError(
-      "implicit face: no closed surface was found around the shell; is it outward, and is the "
-      "resolution fine enough for its depths?");
+      "implicit face: no closed surface was found around the shell; check that its triangles face "
+      "outward and that the resolution is fine enough for its depths");
 }
 
 void DecimateFace(const ImplicitFaceOptions& options, ImplicitFace& face) {
@@ -49,10 +184,10 @@ void DecimateFace(const ImplicitFaceOptions& options, ImplicitFace& face) {
   face.decimation = decimated.summary;
   if (face.decimation.stop != DecimateStop::kTarget) {
     face.notes.push_back(fmt::format(
-        "decimation: {} triangles are left of {} asked for; fewer would {}",
+        "decimation: {} triangles remain, where {} were requested; fewer would {}",
         face.decimation.triangles, options.target_triangles,
         face.decimation.stop == DecimateStop::kTolerance
-            ? fmt::format("lie further off than the tolerance, {:.3g} mm", decimate.tolerance_mm)
+            ? fmt::format("deviate by more than the tolerance, {:.3g} mm", decimate.tolerance_mm)
             : "ruin the shape"));
   }
 }
@@ -62,8 +197,8 @@ void AppendNotes(const ImplicitFaceOptions& options, std::span<const double> dep
   if (!std::holds_alternative<FlatEmitter>(options.field.emitter) &&
       face.emitters_per_square_depth > 1) {
     face.notes.push_back(fmt::format(
-        "emitter density: {:.1f} triangles on a square of the depth; this emitter's surface lies "
-        "the further out the denser the mesh (use 'flat' for the exact depth)",
+        "emitter density: {:.1f} triangles on a square of the depth; this emitter's surface moves "
+        "outward as the mesh gets denser (use 'flat' for the exact depth)",
         face.emitters_per_square_depth));
   }
   double thinnest = std::numeric_limits<double>::infinity();
@@ -85,7 +220,7 @@ TriMesh KeepOutermost(const TriMesh& mesh, int& dropped) {
   }
   const Components components = ConnectedComponents(mesh);
   std::vector<double> volume(components.count, 0);
-  const Vec3 middle = Bounds(mesh).center();  // of a mesh that is open the volume depends on it
+  const Vec3 middle = Bounds(mesh).center();  // the volume of an open mesh depends on this point
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Triangle& c = mesh.triangles[t];
     const Vec3 a = mesh.points[c[0]] - middle, b = mesh.points[c[1]] - middle;

@@ -11,7 +11,7 @@
 #include <span>
 
 #include "fitting/least_squares/qr_compression.h"
-#include "surfaces/hspline/control_net.h"
+#include "surfaces/hspline/bspline.h"
 
 namespace semblance {
 

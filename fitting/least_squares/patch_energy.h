@@ -8,7 +8,7 @@
 #include <Eigen/Core>
 #include <array>
 
-#include "surfaces/hspline/control_net.h"
+#include "surfaces/hspline/bspline.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {

@@ -12,7 +12,7 @@
 #include "fitting/relaxation/joint_relaxation.h"
 #include "fitting/solve/auto_weight.h"
 #include "fitting/solve/space_solve.h"
-#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
 namespace semblance {

@@ -18,7 +18,7 @@
 #include "fitting/solve/auto_weight.h"
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
-#include "surfaces/hspline/bspline_basis.h"
+#include "surfaces/hspline/bspline.h"
 
 namespace semblance {
 namespace {

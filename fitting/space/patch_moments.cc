@@ -5,7 +5,7 @@
 #include <array>
 
 #include "surfaces/base/simd.h"
-#include "surfaces/hspline/bspline_basis.h"
+#include "surfaces/hspline/bspline.h"
 
 namespace semblance {
 namespace {

@@ -13,7 +13,7 @@
 #include "fitting/problem/fit_target.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
-#include "surfaces/hspline/control_net.h"
+#include "surfaces/hspline/bspline.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance {

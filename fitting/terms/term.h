@@ -13,7 +13,6 @@
 #include <string_view>
 #include <variant>
 
-#include "surfaces/base/auto_or.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_shape.h"
 

@@ -13,7 +13,7 @@ namespace semblance {
 namespace {
 
 constexpr double kUnitTolerance = 1e-6;
-constexpr std::size_t kBlock = 2048;  // vertices between two looks at the stop token
+constexpr std::size_t kBlock = 2048;  // vertices between two checks of the stop token
 
 void CheckDowel(const Dowel& dowel) {
   if (!dowel.base.allFinite()) {

@@ -14,8 +14,8 @@
 namespace semblance {
 namespace {
 
-// Relative. A vertex on a shared cutting plane must be in one of its areas in spite of rounding,
-// and a plane closer than this to a degenerate one has no direction left to trust.
+// Relative tolerance against round-off. A vertex on a shared cutting plane must belong to one of
+// its areas, and a plane closer to degeneracy than this has no reliable direction.
 constexpr double kTolerance = 1e-9;
 
 std::string Title(const std::array<const Dowel*, 3>& dowels) {
@@ -23,7 +23,7 @@ std::string Title(const std::array<const Dowel*, 3>& dowels) {
                      dowels[2]->site);
 }
 
-// The cutting plane of d[i], d[j], as a normal with value 1 at d[k].
+// The cutting plane of d[i] and d[j], scaled to the value 1 at d[k].
 Vec3 CuttingPlane(const std::array<const Dowel*, 3>& d, int i, int j, int k) {
   const Vec3 edge = d[j]->base - d[i]->base;
   const Vec3 normal = (d[i]->direction + d[j]->direction).cross(edge);
@@ -44,7 +44,7 @@ Vec3 CuttingPlane(const std::array<const Dowel*, 3>& d, int i, int j, int k) {
   return normal / height;
 }
 
-// Twice the triangle's area along its normal.
+// A normal of twice the triangle's area as length.
 Vec3 TriangleNormal(const std::array<const Dowel*, 3>& d) {
   const Vec3 a = d[1]->base - d[0]->base, b = d[2]->base - d[0]->base, c = b - a;
   const Vec3 normal = a.cross(b);
@@ -78,7 +78,7 @@ DowelArea MakeArea(const std::array<int, 3>& corners, std::span<const Dowel> dow
   return area;
 }
 
-// The barycentric coordinates of p's projection, if p is inside the three cutting planes.
+// The barycentric coordinates of p's projection if p is inside the three cutting planes.
 std::optional<Vec3> Projection(const DowelArea& area, const Vec3& p) {
   Vec3 inside;
   for (int k = 0; k < 3; ++k) {
@@ -90,7 +90,7 @@ std::optional<Vec3> Projection(const DowelArea& area, const Vec3& p) {
   inside = inside.cwiseMax(0);
   const double sum = inside.sum();
   if (sum <= kTolerance) {
-    return std::nullopt;  // in p_c itself, which has no projection
+    return std::nullopt;  // p is p_c, which has no projection
   }
   return inside / sum;
 }
@@ -108,7 +108,7 @@ std::vector<DowelArea> DowelAreas(std::string_view scheme, const DepthInput& inp
   if (input.network.areas.empty()) {
     throw InputError(
         fmt::format("dowel network: there is no area, but {} depth needs at least one; place the "
-                    "dowels of an area, or use scheme nearest or mean",
+                    "dowels of an area, or use the scheme nearest or mean",
                     scheme));
   }
   std::vector<DowelArea> areas;

@@ -14,8 +14,9 @@
 namespace semblance {
 namespace {
 
-constexpr double kLeastShare = 0.1;   // of the least depth, without clamp
-constexpr double kFlatSpread = 1e-3;  // relative; points thinner than this are a plane or a line
+constexpr double kMinDepthShare = 0.1;  // of the smallest depth, without clamp; any small positive
+                                        // share would do
+constexpr double kFlatSpread = 1e-3;    // relative; points flatter than this form a plane or a line
 
 bool Before(const Dowel& a, const Dowel& b) {
   const auto key = [](const Dowel& d) {
@@ -24,7 +25,7 @@ bool Before(const Dowel& a, const Dowel& b) {
   return key(a) < key(b);
 }
 
-// The mean of dowels whose bases are one point.
+// The mean of dowels with the same base.
 DepthSample Merged(const std::vector<Dowel>& same) {
   const auto count = static_cast<double>(same.size());
   DepthSample mean{same.front().base, Vec3::Zero(), 0, 0};
@@ -54,7 +55,7 @@ Vec3 DirectionAround(const std::vector<DepthSample>& samples, const Vec3& p) {
 std::vector<DepthSample> DepthSamples(std::span<const Dowel> dowels) {
   std::vector<Dowel> sorted(dowels.begin(), dowels.end());
   std::ranges::sort(sorted, Before);
-  std::vector<std::vector<Dowel>> groups;  // of one base each
+  std::vector<std::vector<Dowel>> groups;  // one group per base
   for (const Dowel& dowel : sorted) {
     auto it = std::ranges::find_if(groups, [&](const std::vector<Dowel>& group) {
       return (group.front().base - dowel.base).squaredNorm() <= kSamePoint_mm * kSamePoint_mm;
@@ -71,7 +72,7 @@ std::vector<DepthSample> DepthSamples(std::span<const Dowel> dowels) {
 
 DepthLimits::DepthLimits(const std::vector<DepthSample>& samples, bool clamp) {
   const auto [least, most] = std::ranges::minmax_element(samples, {}, &DepthSample::depth_mm);
-  least_mm_ = clamp ? least->depth_mm : kLeastShare * least->depth_mm;
+  least_mm_ = clamp ? least->depth_mm : kMinDepthShare * least->depth_mm;
   most_mm_ = clamp ? most->depth_mm : std::numeric_limits<double>::infinity();
 }
 
@@ -107,7 +108,7 @@ void CheckSurface(std::string_view scheme, const TriMesh& skull) {
   }
 }
 
-SampleFrame FrameOf(const std::vector<DepthSample>& samples) {
+SampleFrame FindSampleFrame(const std::vector<DepthSample>& samples) {
   SampleFrame frame;
   for (const DepthSample& sample : samples) {
     frame.center += sample.base / static_cast<double>(samples.size());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The dowels as scattered data, and what the schemes that need no network share.
+// The dowels as scattered data, and the common parts of the schemes that need no network.
 #pragma once
 
 #include <cstddef>
@@ -12,23 +12,22 @@
 
 namespace semblance {
 
-// Points closer than this are one: two bases, or a vertex and a base, which then has the base's
-// depth.
+// Points closer than this count as one point. A vertex this close to a base gets the base's depth.
 inline constexpr double kSamePoint_mm = 1e-6;
 
 struct DepthSample {
   Vec3 base = Vec3::Constant(kNaN);
   Vec3 direction = Vec3::Constant(kNaN);  // unit
   double depth_mm = kNaN;
-  double sd_mm = kNaN;  // NaN where there is none
+  double sd_mm = kNaN;  // NaN if unknown
 };
 
-// The dowels sorted by site, so that no result depends on their order, not even by rounding. Those
-// whose bases are one point become one sample with the means of their values. At least one dowel.
+// Sorts the dowels by site, so that no result depends on their order, not even by round-off. Dowels
+// with the same base become one sample with the means of their values. Needs at least one dowel.
 std::vector<DepthSample> DepthSamples(std::span<const Dowel> dowels);
 
-// A depth as a scheme may give it: within the samples' range if `clamp`; else only kept from
-// falling below a tenth of the least sample, as a depth must be above 0.
+// Limits a scheme's depth to the samples' range if `clamp`. Otherwise it only keeps the depth above
+// a tenth of the smallest sample, because a depth must be above 0.
 class DepthLimits {
  public:
   DepthLimits(const std::vector<DepthSample>& samples, bool clamp);
@@ -38,12 +37,12 @@ class DepthLimits {
   double least_mm_, most_mm_;
 };
 
-// The option behind it: alike for all schemes that can leave the dowels' range.
+// The common option of all schemes that can leave the dowels' range.
 template <class Visitor>
 void ClampField(Visitor& visit, bool& clamp) {
   visit(FieldInfo{.name = "clamp",
-                  .doc = "keep the depth within the range of the dowels' depths; without, only "
-                         "above a tenth of the least of them"},
+                  .doc = "limit depths to the range of the dowels' depths; if false, only to "
+                         "values above a tenth of the smallest of them"},
         clamp);
 }
 
@@ -52,23 +51,24 @@ struct DepthValue {
   double sd_mm = kNaN;
 };
 
-// at(i) at each vertex that faces the dowels around it, kOutside where that has no depth,
-// kNotFacing at the others. The direction of the dowels around a vertex is their mean, weighted by
-// the inverse squared distance.
+// Assigns at(i) to each vertex i that faces the dowels around it, or kOutside if at(i) is NaN;
+// other vertices get kNotFacing. The direction of the dowels around a vertex is their mean
+// direction, weighted by the inverse squared distance.
 DepthField AssignWhereFacing(const DepthInput& input, const std::vector<DepthSample>& samples,
                              double max_angle_deg, const RunContext& run,
                              const std::function<DepthValue(std::size_t)>& at);
 
-// Throws InputError, naming the scheme, if the skull has no triangle.
+// Throws InputError, with the scheme's name, if the skull has no triangle.
 void CheckSurface(std::string_view scheme, const TriMesh& skull);
 
-// Centre, size and directions of a set of points: what makes linear terms well-posed.
+// Center, size and principal directions of a set of points. Linear terms are restricted to these
+// directions, which keeps their equations solvable.
 struct SampleFrame {
   Vec3 center = Vec3::Zero();
-  double size_mm = 1;      // rms distance from the centre; 1 if all are in one point
-  std::vector<Vec3> axes;  // the directions in which the points spread: 3, 2 (plane), 1, or 0
+  double size_mm = 1;      // RMS distance from the center; 1 if all points coincide
+  std::vector<Vec3> axes;  // directions in which the points spread: 3, 2 (a plane), 1 (a line) or 0
 };
 
-SampleFrame FrameOf(const std::vector<DepthSample>& samples);
+SampleFrame FindSampleFrame(const std::vector<DepthSample>& samples);
 
 }  // namespace semblance

@@ -8,8 +8,8 @@
 #include <map>
 #include <numeric>
 
-#include "interp/dowels/site_code.h"
-#include "interp/evaluation/calibration.h"
+#include "interp/dowels/dowel.h"
+#include "interp/evaluation/scores.h"
 #include "interp/stacking/leave_out.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
@@ -21,7 +21,7 @@ Interpolator AnyInterpolator(const DepthScheme& scheme) {
   return std::visit(
       [&](const auto& options) -> Interpolator {
         if constexpr (requires { SingleScheme(options); }) {
-          return InterpolatorOf(SingleScheme(options));
+          return MakeInterpolator(SingleScheme(options));
         } else {
           return {.interpolate =
                       [options](const DepthInput& input, const RunContext& run) {
@@ -56,7 +56,7 @@ SdByDistance SdLearned(const std::vector<LeftOut>& left_out) {
   return FitSdByDistance(errors_mm, distances_mm);
 }
 
-// Each fold's from the other folds.
+// Learns each fold's sd from the other folds.
 void StateSds(std::vector<std::vector<LeftOut>>& folds) {
   for (std::size_t f = 0; f < folds.size(); ++f) {
     std::vector<LeftOut> others;
@@ -72,7 +72,7 @@ void StateSds(std::vector<std::vector<LeftOut>>& folds) {
   }
 }
 
-DepthScores ScoresOf(const std::vector<LeftOut>& left_out, bool with_rule) {
+DepthScores ScoreLeftOut(const std::vector<LeftOut>& left_out, bool with_rule) {
   std::vector<double> errors_mm, sds_mm;
   for (const LeftOut& out : left_out) {
     if (with_rule || out.status == DepthStatus::kAssigned) {
@@ -108,8 +108,8 @@ void Summarise(CrossValidation& result) {
   }
   result.coverage = Coverage(errors_mm, sds_mm);
   result.coverage_90 = CoverageAt90(result.coverage);
-  result.scores = ScoresOf(result.left_out, /*with_rule=*/false);
-  result.scores_with_rule = ScoresOf(result.left_out, /*with_rule=*/true);
+  result.scores = ScoreLeftOut(result.left_out, /*with_rule=*/false);
+  result.scores_with_rule = ScoreLeftOut(result.left_out, /*with_rule=*/true);
 }
 
 }  // namespace
@@ -146,7 +146,8 @@ Folds EachSide(std::span<const Dowel> dowels) {
 Folds RandomFolds(std::span<const Dowel> dowels, int count, std::uint64_t random_seed) {
   if (count < 2) {
     throw InputError(fmt::format(
-        "cross-validation: {} folds; at least 2 are needed, as each is left out in turn", count));
+        "cross-validation: {} folds; at least 2 are needed, because each is left out in turn",
+        count));
   }
   std::vector<std::size_t> order(dowels.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
@@ -168,7 +169,7 @@ CrossValidation CrossValidate(const DepthScheme& scheme, const OutsideRule& rule
   std::vector<std::vector<LeftOut>> left_out(folds.size());
   CrossValidation result;
   for (std::size_t f = 0; f < folds.size(); ++f) {
-    const ShownDowels shown = Without(input, folds[f]);
+    const ShownDowels shown = LeaveOutDowels(input.dowels, input.network, folds[f]);
     for (std::size_t k = 0; k < folds[f].size(); ++k) {
       const Dowel& dowel = input.dowels[folds[f][k]];
       LeftOut out = Compared(dowel, fields[f], k);
@@ -193,7 +194,7 @@ DepthField WithStatedSd(DepthField field, const CrossValidation& known, const De
   if (known.own_sd) {
     return field;
   }
-  const ShownDowels all = Without(input, {});
+  const ShownDowels all = LeaveOutDowels(input.dowels, input.network, {});
   ForEachVertex(input, run, [&](std::size_t i) {
     if (std::isfinite(field.depth_mm[i])) {
       field.sd_mm[i] = known.sd.At(all.NearestTo_mm(input.skull.points[i]));

@@ -12,22 +12,22 @@ namespace {
 
 using CellKey = std::array<std::int32_t, 3>;
 
-// The vertices in cubes of the radius's size, sorted by cube: those within the radius of a point
-// are in the 27 around it.
+// The vertices sorted by cubes whose side is the radius, so that the vertices within the radius of
+// a point lie in the 27 cubes around it.
 class VertexGrid {
  public:
   VertexGrid(const std::vector<Vec3>& points, double size_mm) : points_(points), size_mm_(size_mm) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      entries_.push_back({KeyOf(points[i]), static_cast<int>(i)});
+      entries_.push_back({CellKeyAt(points[i]), static_cast<int>(i)});
     }
     std::ranges::sort(entries_);
   }
 
   template <class Use>
   void ForEachWithin(const Vec3& p, Use&& use) const {
-    const CellKey at = KeyOf(p);
+    const CellKey at = CellKeyAt(p);
     for (int dx = -1; dx <= 1; ++dx) {
-      for (int dy = -1; dy <= 1; ++dy) {  // the three cubes along z stand side by side
+      for (int dy = -1; dy <= 1; ++dy) {  // the three cubes along z are consecutive
         const CellKey low = {at[0] + dx, at[1] + dy, at[2] - 1};
         const CellKey high = {at[0] + dx, at[1] + dy, at[2] + 1};
         for (auto it = std::ranges::lower_bound(entries_, low, {}, &Entry::key);
@@ -46,7 +46,7 @@ class VertexGrid {
     int vertex;
     auto operator<=>(const Entry&) const = default;
   };
-  CellKey KeyOf(const Vec3& p) const {
+  CellKey CellKeyAt(const Vec3& p) const {
     CellKey key;
     for (int axis = 0; axis < 3; ++axis) {
       key[axis] = static_cast<std::int32_t>(std::floor(p[axis] / size_mm_));
@@ -59,12 +59,12 @@ class VertexGrid {
   std::vector<Entry> entries_;
 };
 
-std::vector<Vec3> DirectionsOf(const MeshNormal&, const DepthInput& input, const RunContext&) {
+std::vector<Vec3> FindDirections(const MeshNormal&, const DepthInput& input, const RunContext&) {
   return {input.normals.begin(), input.normals.end()};
 }
 
-std::vector<Vec3> DirectionsOf(const SmoothedNormal& options, const DepthInput& input,
-                               const RunContext& run) {
+std::vector<Vec3> FindDirections(const SmoothedNormal& options, const DepthInput& input,
+                                 const RunContext& run) {
   const std::vector<double> areas = VertexAreas(input.skull);
   const VertexGrid grid(input.skull.points, options.radius_mm);
   std::vector<Vec3> directions(input.skull.points.size());
@@ -80,8 +80,8 @@ std::vector<Vec3> DirectionsOf(const SmoothedNormal& options, const DepthInput& 
   return directions;
 }
 
-std::vector<Vec3> DirectionsOf(const DowelDirection&, const DepthInput& input,
-                               const RunContext& run) {
+std::vector<Vec3> FindDirections(const DowelDirection&, const DepthInput& input,
+                                 const RunContext& run) {
   const std::vector<DowelArea> areas = DowelAreas(DowelDirection::kName, input);
   std::vector<Vec3> directions(input.normals.begin(), input.normals.end());
   ForEachVertex(input, run, [&](std::size_t i) {
@@ -104,7 +104,7 @@ std::vector<Vec3> DepthDirections(const DepthDirection& direction, const DepthIn
                                   const RunContext& run) {
   CheckDepthInput(input);
   run.ThrowIfStopped();
-  return std::visit([&](const auto& options) { return DirectionsOf(options, input, run); },
+  return std::visit([&](const auto& options) { return FindDirections(options, input, run); },
                     direction);
 }
 

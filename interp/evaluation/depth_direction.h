@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The direction along which a vertex's depth is taken: the soft tissue lies at p + depth *
-// direction (thesis 2.2, which offers the skull's normal and interpolated dowel directions).
+// The direction along which a vertex's depth is measured: the skin lies at p + depth * direction.
+// The thesis (2.2) offers the skull's normal and interpolated dowel directions.
 #pragma once
 
 #include <string_view>
@@ -11,19 +11,19 @@
 
 namespace semblance {
 
-// The mesh's normal at the vertex, as rough as the mesh.
+// The mesh's normal at the vertex, which is as rough as the mesh.
 struct MeshNormal {
   static constexpr std::string_view kName = "mesh_normal";
 };
 template <class Visitor>
 void Fields(Visitor&, MeshNormal&) {}
 
-// The mean of the mesh's normals at the vertices within a radius, each by the area it stands for;
-// of those that face within 90 degrees of the vertex's own, so that the inner side of a thin wall
-// has no say.
+// The area-weighted mean of the normals of the vertices within a radius. Normals more than 90
+// degrees from the vertex's own are left out, so that the inner side of a thin wall has no
+// influence.
 struct SmoothedNormal {
   static constexpr std::string_view kName = "smoothed_normal";
-  double radius_mm = 5;  // of the sphere in which normals are averaged
+  double radius_mm = 5;
 };
 template <class Visitor>
 void Fields(Visitor& visit, SmoothedNormal& o) {
@@ -31,13 +31,13 @@ void Fields(Visitor& visit, SmoothedNormal& o) {
                   .unit = "mm",
                   .min = 0.1,
                   .max = 100,
-                  .doc = "of the sphere in which the normals are averaged; more is smoother and "
-                         "rounds rims off"},
+                  .doc = "radius of the sphere in which normals are averaged; more is smoother and "
+                         "rounds off rims"},
         o.radius_mm);
 }
 
-// The dowels' directions, barycentric in the dowel area of the vertex (`barycentric`'s areas); the
-// mesh's normal outside the network, and where the directions cancel.
+// The barycentric mean of the dowels' directions in the vertex's dowel area. Outside the network,
+// and where the directions cancel, the mesh's normal.
 struct DowelDirection {
   static constexpr std::string_view kName = "dowel_direction";
 };
@@ -46,8 +46,9 @@ void Fields(Visitor&, DowelDirection&) {}
 
 using DepthDirection = std::variant<MeshNormal, SmoothedNormal, DowelDirection>;
 
-// Unit, one per vertex; zero where the mesh has no normal (and no dowel area helps). Throws
-// InputError as CheckDepthInput, and dowel_direction as DowelAreas; Cancelled if stopped.
+// Computes one unit direction per vertex; zero if the mesh has no normal there and no dowel area
+// applies. Throws InputError as CheckDepthInput does and, for dowel_direction, as DowelAreas does;
+// Cancelled if stopped.
 std::vector<Vec3> DepthDirections(const DepthDirection& direction, const DepthInput& input,
                                   const RunContext& run);
 

@@ -27,7 +27,8 @@ class TruthMeter {
         query_(skin),
         least_cosine_(std::cos(options.max_grazing_deg * std::numbers::pi / 180)) {}
 
-  // The ray may start on the outer side of an inner wall: what it enters by is not its skin.
+  // A ray may start outside an inner wall. Skin through which the ray enters is not the skin of its
+  // vertex.
   Measured Along(const Vec3& p, const Vec3& direction) const {
     const auto hit = query_.FirstHit(p, direction, options_.max_depth_mm);
     if (!hit) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The true depth at every vertex of a skull whose skin is known: what schemes are measured against.
+// The true depth at every vertex of a skull with known skin, to which schemes are compared.
 #pragma once
 
 #include <cstdint>
@@ -13,8 +13,8 @@
 namespace semblance {
 
 struct DepthTruthOptions {
-  double max_depth_mm = 60;     // thicker tissue is an error of the search
-  double max_grazing_deg = 75;  // between skin's normal and the direction
+  double max_depth_mm = 60;
+  double max_grazing_deg = 75;
 };
 template <class Visitor>
 void Fields(Visitor& visit, DepthTruthOptions& o) {
@@ -22,42 +22,42 @@ void Fields(Visitor& visit, DepthTruthOptions& o) {
                   .unit = "mm",
                   .min = 1,
                   .max = 200,
-                  .doc = "true tissue thicker than this is taken for an error of the search"},
+                  .doc = "thicker tissue counts as an error of the measurement"},
         o.max_depth_mm);
   visit(FieldInfo{.name = "max_grazing_deg",
                   .unit = "deg",
                   .min = 1,
                   .max = 90,
-                  .doc = "skin that stands steeper than this to the direction of the depth is "
-                         "grazed, not measured"},
+                  .doc = "largest angle between the skin's normal and the direction of the depth; "
+                         "beyond it the ray grazes the skin, and no depth is measured"},
         o.max_grazing_deg);
 }
 
 enum class TruthStatus : std::uint8_t {
   kValid,
   kNoDirection,  // the vertex has no direction
-  kNoHit,        // no skin within max_depth_mm that the direction leaves by
-  kTooFar,       // the closest skin is further than max_depth_mm
-  kGrazing,      // skin is met at more than max_grazing_deg from its normal
+  kNoHit,        // the ray leaves through no skin within max_depth_mm
+  kTooFar,       // the closest skin is more than max_depth_mm away
+  kGrazing,      // the angle to the skin's normal is above max_grazing_deg
   kBehind        // the closest skin lies on the inner side of the bone
 };
 
-// One convention's depths.
+// The depths of one convention.
 struct TruthMap {
-  std::vector<double> depth_mm;     // one per vertex, >= 0; NaN where not valid
+  std::vector<double> depth_mm;     // one per vertex, >= 0; NaN if not valid
   std::vector<TruthStatus> status;  // one per vertex
 };
 
-// The two conventions of the literature, kept apart: of one head they differ by half a millimetre
-// and more where skin is not parallel to bone, and the second is never more.
+// The depths by the two conventions of the literature. They differ by half a millimetre and more
+// where skin and bone are not parallel. The second is never larger.
 struct DepthTruth {
-  TruthMap along_direction;  // to the first skin that the ray leaves by
-  TruthMap closest;          // to the closest point of the skin
+  TruthMap along_direction;  // to the first skin through which the ray leaves
+  TruthMap closest;          // to the closest skin point
 };
 
-// directions: unit or zero, one per vertex of the skull. Skin's triangles face outwards; inner
-// walls of airways may be there. Throws InputError if the directions are not one per vertex or the
-// skin has no triangle; Cancelled if stopped.
+// Measures the depths. directions: unit or zero, one per vertex of the skull. skin: with outward
+// triangles; it may contain inner walls of airways. Throws InputError if there is not one direction
+// per vertex or the skin has no triangle; Cancelled if stopped.
 DepthTruth MeasureDepthTruth(const TriMesh& skull, std::span<const Vec3> directions,
                              const TriMesh& skin, const DepthTruthOptions& options,
                              const RunContext& run);

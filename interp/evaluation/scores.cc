@@ -7,20 +7,23 @@
 #include <limits>
 #include <numbers>
 
-#include "interp/evaluation/calibration.h"
+#include "surfaces/base/geometry.h"
 
 namespace semblance {
 namespace {
+
+constexpr int kLevels = 19;  // 5 % .. 95 %
+constexpr double kRounding = 1e-9;
 
 double Density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * std::numbers::pi); }
 double Cumulative(double z) { return std::erfc(-z / std::numbers::sqrt2) / 2; }
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-// Half the width of the central interval that holds the share, in standard deviations.
+// Half the width of the central interval with this probability, in standard deviations.
 double Reach(double share) { return std::numbers::sqrt2 * boost::math::erf_inv(share); }
 
-// Sums over points by weight; a mean is a sum over its weight.
+// Weighted sums over points.
 struct Sums {
   double weight = 0, absolute = 0, squares = 0, error = 0;
   double stated = 0, crps = 0, log_score = 0, interval = 0, sd = 0;
@@ -86,6 +89,40 @@ void PutMeans(const Sums& sums, DepthScores& scores) {
 }
 
 }  // namespace
+
+double ShareAround(double error, double sd) {
+  if (sd > 0) {
+    return std::erf(std::abs(error) / (sd * std::numbers::sqrt2));
+  }
+  return std::abs(error) <= kRounding ? 0 : 1;
+}
+
+std::vector<double> Coverage(std::span<const double> errors, std::span<const double> sds,
+                             std::span<const double> weights) {
+  std::vector<double> within(kLevels, 0);
+  double all = 0;
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    if (!std::isfinite(errors[i]) || !std::isfinite(sds[i])) {
+      continue;
+    }
+    const double weight = weights.empty() ? 1 : weights[i], share = ShareAround(errors[i], sds[i]);
+    all += weight;
+    for (int k = 0; k < kLevels; ++k) {
+      within[k] += share <= (k + 1) / 20.0 ? weight : 0;
+    }
+  }
+  if (!(all > 0)) {
+    return {};
+  }
+  for (double& share : within) {
+    share /= all;
+  }
+  return within;
+}
+
+double CoverageAt90(const std::vector<double>& coverage) {
+  return coverage.empty() ? kNaN : coverage[17];
+}
 
 double GaussianCrps_mm(double error_mm, double sd_mm) {
   if (sd_mm == 0) {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scores of predictions that state a standard deviation: a forecast is the normal distribution with
-// the prediction as its mean and the stated sd. CRPS, interval score and log score are proper: none
-// is better in the mean than the true distribution (Gneiting & Raftery 2007, JASA 102).
+// Scores and calibration of predictions that state a standard deviation. The forecast is a normal
+// distribution with the prediction as its mean and the stated sd. CRPS, interval score and log
+// score are proper scores: no forecast has a better expected score than the true distribution
+// (Gneiting & Raftery 2007, JASA 102).
 #pragma once
 
 #include <span>
@@ -11,35 +12,50 @@
 
 namespace semblance {
 
-// error: predicted less true, mm. sd_mm >= 0; that of 0 is a forecast without doubt, and its scores
-// are what the others tend to. All are better the smaller they are.
+// The probability (0..1) of the smallest central interval of a normal distribution that contains
+// the error. With an sd of 0 it is 0 for an error of 0 (within 1e-9, for round-off) and otherwise
+// 1. sd >= 0.
+double ShareAround(double error, double sd);
 
-// Continuous ranked probability score, mm: the integral over x of (F(x) - [x >= truth])^2. In
-// closed form sd (z (2 Phi(z) - 1) + 2 phi(z) - 1 / sqrt(pi)), z = error / sd (ibid., eq. 5).
+// The calibration curve: the shares (0..1) of errors within the central intervals that should
+// contain 5 %, 10 %, .. 95 % of them; 19 ascending values. It uses errors whose error and sd are
+// finite. weights: one per error, >= 0, or none for equal weights. Empty if the total weight is 0.
+std::vector<double> Coverage(std::span<const double> errors, std::span<const double> sds,
+                             std::span<const double> weights = {});
+
+// The curve's value at 90 %; NaN for an empty curve.
+double CoverageAt90(const std::vector<double>& coverage);
+
+// In all scores error_mm is predicted minus true and sd_mm >= 0. Smaller is better. The scores of
+// sd_mm = 0, a certain forecast, are the limits for sd_mm -> 0.
+
+// Continuous ranked probability score, mm: the integral over x of (F(x) - [x >= truth])^2. The
+// closed form is sd (z (2 Phi(z) - 1) + 2 phi(z) - 1 / sqrt(pi)) with z = error / sd (ibid., eq.
+// 5).
 double GaussianCrps_mm(double error_mm, double sd_mm);
 
-// Less the logarithm of the density at the truth: log(sd sqrt(2 pi)) + z^2 / 2. Of an sd of 0
-// infinite: below 0 where the error is none (ShareAround of calibration.h), else above.
+// Negative logarithm of the density at the truth: log(sd sqrt(2 pi)) + z^2 / 2. For an sd of 0 it
+// is -infinity if the error is 0 (as in ShareAround), otherwise +infinity.
 double GaussianLogScore(double error_mm, double sd_mm);
 
-// Of the central interval that should hold `share`: its width, and 2 / (1 - share) times what the
-// truth lies outside of it (ibid., eq. 43). share: above 0, below 1.
+// Interval score of the central interval with probability `share` (0 < share < 1): its width plus 2
+// / (1 - share) times the distance of the truth from the interval (ibid., eq. 43).
 double GaussianIntervalScore_mm(double error_mm, double sd_mm, double share);
 
-// Probability integral transform: the share of the forecast below the truth, 0..1. Uniform where
-// forecasts are right. sd_mm > 0, or an error that is not 0.
+// Probability integral transform: the forecast's probability (0..1) below the truth. It is
+// uniformly distributed for correct forecasts. Needs sd_mm > 0 or an error that is not 0.
 double GaussianPit(double error_mm, double sd_mm);
 
 inline constexpr int kPitBins = 10;
 
-// Means, by weight, over the points with a finite error; from crps_mm on over those of them with a
-// stated sd. NaN, and no pit, where there is none. One forecast without doubt makes log_score
-// infinite: above 0 if one of them errs. In the pit a certain forecast that is right counts in all
-// parts alike.
+// Weighted means over the points with a finite error; from crps_mm on, over the points with a
+// stated sd. NaN, and an empty pit, if there are no such points. A certain forecast makes log_score
+// infinite: +infinity if one of them is wrong. A certain and correct forecast counts equally in all
+// parts of the pit.
 struct DepthScores {
-  int points = 0;   // with a finite error
-  int stated = 0;   // of these, with an sd
-  int certain = 0;  // of these, with an sd of 0
+  int points = 0;   // points with a finite error
+  int stated = 0;   // of these, points with a stated sd
+  int certain = 0;  // of these, points with an sd of 0
   double mae_mm = kNaN;
   double rmse_mm = kNaN;
   double bias_mm = kNaN;  // above 0: predicted too thick
@@ -48,11 +64,11 @@ struct DepthScores {
   double interval_score_90_mm = kNaN;
   double coverage_50 = kNaN, coverage_90 = kNaN, coverage_95 = kNaN;
   double mean_sd_mm = kNaN;
-  std::vector<double> pit;  // share in each of kPitBins equal parts of 0..1
+  std::vector<double> pit;  // share of points in each of kPitBins equal parts of 0..1
 };
 
-// sds: one per error, >= 0, NaN where none is stated. weights: one per error, >= 0, or none for
-// equal ones.
+// sds: one per error, >= 0, NaN if not stated. weights: one per error, >= 0, or none for equal
+// weights.
 DepthScores ScoreDepths(std::span<const double> errors, std::span<const double> sds,
                         std::span<const double> weights = {});
 

@@ -11,13 +11,13 @@ namespace {
 
 constexpr int kPoints = 1500;
 
-// A point that takes part, and what it counts.
+// A sampled point and its weight.
 struct Taken {
   std::size_t point = 0;
   double weight = 0;
 };
 
-// All with a weight; of too many those at equal steps of the sum of weights.
+// All points with a weight; if there are too many, those at equal steps of the cumulative weight.
 std::vector<Taken> EvenlyByWeight(std::span<const double> values, std::span<const double> weights) {
   const auto weight = [&](std::size_t k) {
     return !std::isfinite(values[k]) ? 0.0 : weights.empty() ? 1.0 : weights[k];
@@ -48,7 +48,7 @@ std::vector<Taken> EvenlyByWeight(std::span<const double> values, std::span<cons
   return taken;
 }
 
-// Nugget and sill for a length, by reweighted least squares; a negative one is put at 0.
+// Fits nugget and sill for a length by reweighted least squares; a negative value becomes 0.
 VariogramModel FitAt(double length_mm, std::span<const VariogramBin> bins) {
   VariogramModel model{.nugget_mm2 = 0, .sill_mm2 = 0, .length_mm = length_mm};
   std::vector<double> now;
@@ -78,7 +78,7 @@ VariogramModel FitAt(double length_mm, std::span<const VariogramBin> bins) {
   return model;
 }
 
-double MisfitOf(const VariogramModel& model, std::span<const VariogramBin> bins) {
+double RelativeMisfit(const VariogramModel& model, std::span<const VariogramBin> bins) {
   double sum = 0;
   for (const VariogramBin& bin : bins) {
     const double off = bin.semivariance_mm2 / std::max(model.At(bin.distance_mm), 1e-12) - 1;
@@ -100,7 +100,7 @@ std::vector<VariogramBin> EmpiricalVariogram(std::span<const Vec3> points,
   const std::vector<Taken> taken = EvenlyByWeight(values, weights);
   const auto count = static_cast<std::size_t>(std::ceil(reach_mm / bin_mm));
   std::vector<VariogramBin> bins(count, {.distance_mm = 0, .semivariance_mm2 = 0});
-  std::vector<double> sums(count, 0);  // of weights
+  std::vector<double> sums(count, 0);  // sums of weights
   for (std::size_t i = 0; i < taken.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) {
       const auto& [a, weight_a] = taken[i];
@@ -137,7 +137,7 @@ VariogramModel FitVariogram(std::span<const VariogramBin> bins) {
   double least = std::numeric_limits<double>::infinity();
   for (int k = 0; k < kLengths; ++k) {
     const VariogramModel model = FitAt(first * std::pow(ratio, k), bins);
-    if (const double misfit = MisfitOf(model, bins); misfit < least) {
+    if (const double misfit = RelativeMisfit(model, bins); misfit < least) {
       least = misfit;
       best = model;
     }

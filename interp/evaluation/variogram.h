@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How unlike depths are that lie some way apart: half their mean squared difference by distance
-// (Cressie 1993, Statistics for Spatial Data, 2.4).
+// The variogram of depths: half the mean squared difference of two depths as a function of their
+// distance (Cressie 1993, Statistics for Spatial Data, 2.4).
 #pragma once
 
 #include <cstdint>
@@ -12,33 +12,36 @@
 namespace semblance {
 
 struct VariogramBin {
-  double distance_mm = kNaN;       // mean of the bin's pairs, by weight
-  double semivariance_mm2 = kNaN;  // half the mean of their squared differences, by weight
-  std::int64_t pairs = 0;          // above 0
+  double distance_mm = kNaN;       // weighted mean over the bin's pairs
+  double semivariance_mm2 = kNaN;  // half the weighted mean squared difference
+  std::int64_t pairs = 0;          // > 0
 };
 
-// nugget + sill (1 - exp(-h / length)) at the distance h > 0: the covariance matern_1_2.
+// The model nugget + sill (1 - exp(-h / length)) at the distance h > 0, which belongs to the
+// covariance matern_1_2.
 struct VariogramModel {
-  double nugget_mm2 = kNaN;  // >= 0, of neighbours that all but touch
-  double sill_mm2 = kNaN;    // >= 0, what distance adds to it
-  double length_mm = kNaN;   // at which 63 % of it are reached
+  double nugget_mm2 = kNaN;  // >= 0; the limit at distance 0
+  double sill_mm2 = kNaN;    // >= 0; the increase with distance
+  double length_mm = kNaN;   // distance at which 63 % of the sill is reached
 
   double At(double distance_mm) const;  // mm^2
 };
 
-// Straight distances, in bins of bin_mm up to reach_mm; empty bins are left out. Values that are
-// not finite take no part. A pair counts by the product of its points' weights, so that with areas
-// as weights no figure depends on where a mesh is finer. Of more than 1500 points it takes 1500,
-// evenly by weight in their order; one that weighs several steps counts so many times. weights: one
-// per point, >= 0, or none for equal ones. bin_mm, reach_mm > 0.
+// Computes the variogram by straight distances, in bins of bin_mm (> 0) up to reach_mm (> 0),
+// without empty bins. Values that are not finite are ignored. A pair is weighted by the product of
+// its points' weights; with areas as weights the result does not depend on the local mesh density.
+// If there are more than 1500 points, 1500 are sampled in equal steps of cumulative weight; a point
+// that spans several steps counts that many times. weights: one per point, >= 0, or none for equal
+// weights.
 std::vector<VariogramBin> EmpiricalVariogram(std::span<const Vec3> points,
                                              std::span<const double> values,
                                              std::span<const double> weights, double bin_mm,
                                              double reach_mm);
 
-// The least sum of pairs (semivariance / model - 1)^2 (Cressie 1985, Mathematical Geology 17) over
-// 60 lengths in even ratios from the first bin's distance to three times the last one's, by ten
-// reweighted linear fits for each. NaN for fewer than three bins or none above 0.
+// Fits the model that minimises the sum of pairs (semivariance / model - 1)^2 (Cressie 1985,
+// Mathematical Geology 17). It tries 60 lengths in equal ratios, from the first bin's distance to
+// three times the last bin's, with ten reweighted linear fits each. NaN for fewer than three bins
+// or if no bin is above 0.
 VariogramModel FitVariogram(std::span<const VariogramBin> bins);
 
 }  // namespace semblance

@@ -10,9 +10,10 @@
 namespace semblance {
 namespace {
 
-constexpr int kSteps = 8;  // of the grid
+constexpr int kSteps = 8;  // grid cells per number
 
-// The cost over all real arguments: each number is low + (high - low) / (1 + e^-argument).
+// The cost as a function of unbounded arguments: each number is low + (high - low) / (1 +
+// e^-argument).
 class BoundedCost final : public ceres::FirstOrderFunction {
  public:
   BoundedCost(const SearchRange& bounds, const SmoothCost& cost, const RunContext& run)
@@ -20,7 +21,7 @@ class BoundedCost final : public ceres::FirstOrderFunction {
 
   int NumParameters() const override { return static_cast<int>(bounds_.low.size()); }
 
-  Eigen::VectorXd NumbersOf(const double* arguments) const {
+  Eigen::VectorXd Numbers(const double* arguments) const {
     return bounds_.low + (bounds_.high - bounds_.low).cwiseProduct(Share(arguments));
   }
 
@@ -29,11 +30,11 @@ class BoundedCost final : public ceres::FirstOrderFunction {
       return false;
     }
     if (gradient == nullptr) {
-      *value = cost_(NumbersOf(arguments), nullptr);
+      *value = cost_(Numbers(arguments), nullptr);
       return std::isfinite(*value);
     }
     Eigen::VectorXd by_number;
-    *value = cost_(NumbersOf(arguments), &by_number);
+    *value = cost_(Numbers(arguments), &by_number);
     const Eigen::VectorXd share = Share(arguments);
     for (Eigen::Index k = 0; k < share.size(); ++k) {
       gradient[k] = by_number[k] * (bounds_.high[k] - bounds_.low[k]) * share[k] * (1 - share[k]);
@@ -52,7 +53,7 @@ class BoundedCost final : public ceres::FirstOrderFunction {
   const RunContext& run_;
 };
 
-// The arguments of one of the grid's cells; of a fixed number there is one cell.
+// The arguments at the center of a grid cell; a fixed number has one cell.
 Eigen::VectorXd Middle(const SearchRange& bounds, int cell) {
   Eigen::VectorXd arguments = Eigen::VectorXd::Zero(bounds.low.size());
   for (Eigen::Index k = bounds.low.size(); k-- > 0;) {
@@ -89,25 +90,25 @@ Eigen::VectorXd FindMinimum(const SearchRange& bounds, const SmoothCost& cost,
     return bounds.low;
   }
   auto* bounded = new BoundedCost(bounds, cost, run);
-  const ceres::GradientProblem problem(bounded);  // owns it
+  const ceres::GradientProblem problem(bounded);  // takes ownership
   Eigen::VectorXd arguments = BestOfGrid(bounds, *bounded);
   ceres::GradientProblemSolver::Options how;
   how.line_search_direction_type = ceres::BFGS;
   how.logging_type = ceres::SILENT;
-  how.function_tolerance = 1e-16;  // the gradient decides
+  how.function_tolerance = 1e-16;  // the gradient decides on convergence
   how.gradient_tolerance = 1e-7;
   ceres::GradientProblemSolver::Summary summary;
   ceres::Solve(how, problem, arguments.data(), &summary);
   run.ThrowIfStopped();
-  return bounded->NumbersOf(arguments.data());
+  return bounded->Numbers(arguments.data());
 }
 
-// At a minimum within the range the cost has no slope; beside an end where it still falls outward
-// it has.
+// At a minimum inside the range the cost has no slope. Near an end that holds the number back, the
+// cost still falls outward.
 RangeEnd EndOfRange(const SearchRange& bounds, const SmoothCost& cost, const Eigen::VectorXd& x,
                     Eigen::Index number) {
-  constexpr double kBeside = 0.1;  // of the range: the logistic map never reaches its ends
-  constexpr double kSlope = 1e-3;  // far above what rounding leaves of a minimum's
+  constexpr double kBeside = 0.1;  // of the range, since the logistic map never reaches the ends
+  constexpr double kSlope = 1e-3;  // far above the round-off of a slope at a minimum
   const double range = bounds.high[number] - bounds.low[number];
   if (!(range > 0)) {
     return RangeEnd::kNone;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The least of a smooth cost of a few numbers within bounds.
+// Minimises a smooth cost of a few numbers within bounds.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,21 +10,21 @@
 namespace semblance {
 
 struct SearchRange {
-  Eigen::VectorXd low, high;  // equal ones hold a number fixed
+  Eigen::VectorXd low, high;  // equal bounds fix a number
 };
 
-// The value at x; with a gradient, sets it too.
+// Returns the cost at x, and its gradient if `gradient` is not null.
 using SmoothCost = std::function<double(const Eigen::VectorXd& x, Eigen::VectorXd* gradient)>;
 
-// From the best of the middles of a grid of eight cells a number by Ceres' BFGS, over arguments
-// that a logistic map keeps within the bounds. Not finite costs count as worse than any. Throws
-// Cancelled if stopped.
+// Starts at the best center of a grid with eight cells per number, and descends by Ceres' BFGS. A
+// logistic map of the arguments keeps the numbers within the bounds. Costs that are not finite
+// count as worse than all others. Throws Cancelled if stopped.
 Eigen::VectorXd FindMinimum(const SearchRange& bounds, const SmoothCost& cost,
                             const RunContext& run);
 
-// Where a number of the minimum stands: free, or at an end of its range that holds it back.
+// The end of its range at which a number of the minimum is held, or kNone.
 enum class RangeEnd { kNone, kLow, kHigh };
-// x: what FindMinimum found. A number that is held fixed is at no end.
+// x: the result of FindMinimum. A fixed number gives kNone.
 RangeEnd EndOfRange(const SearchRange& bounds, const SmoothCost& cost, const Eigen::VectorXd& x,
                     Eigen::Index number);
 

@@ -7,7 +7,6 @@
 
 #include "interp/kriging/kriging.h"
 #include "interp/on_surface/bone_geometry.h"
-#include "interp/on_surface/bone_relief.h"
 #include "interp/on_surface/coarse_surface.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -15,10 +14,10 @@
 namespace semblance {
 namespace {
 
-constexpr double kReliefEdge_mm = 3;
+constexpr double kReliefEdge_mm = 3;  // mesh for the relief; well below the smaller scale
 constexpr std::array kReliefScales_mm = {10.0, 40.0};
 
-// t at points: depths that are expected there.
+// The expected depths t at points.
 Eigen::MatrixXd ExpectedAt(std::span<const Vec3> points, std::span<const Dowel> expected,
                            const RunContext& run) {
   const TriMesh at{{points.begin(), points.end()}, {}};
@@ -41,33 +40,33 @@ struct MeanRegressors::Bone {
   Bone(DepthMean mean, const DepthInput& input, const RunContext& run)
       : surface(input.skull, kReliefEdge_mm, run),
         query(input.skull),
-        of_vertices(OfVertices(mean, surface.mesh(), input.dowels)) {}
+        at_vertices(AtMeshVertices(mean, surface.mesh(), input.dowels)) {}
 
-  static Eigen::MatrixXd OfVertices(DepthMean mean, const TriMesh& mesh,
-                                    std::span<const Dowel> dowels) {
+  static Eigen::MatrixXd AtMeshVertices(DepthMean mean, const TriMesh& mesh,
+                                        std::span<const Dowel> dowels) {
     const Eigen::MatrixXd relief = BoneRelief(mesh, kReliefScales_mm);
     if (mean != DepthMean::kGeometry) {
       return relief;
     }
     Eigen::MatrixXd both(relief.rows() + kBoneGeometry, relief.cols());
-    both << relief, BoneGeometry(mesh, FrameOfHead(dowels));
+    both << relief, BoneGeometry(mesh, FindHeadFrame(dowels));
     return both;
   }
 
-  // 1 and what is known of p, which is near a vertex of the skull.
+  // 1 and the bone's regressors at p, which is near a vertex of the skull.
   Eigen::VectorXd At(const Vec3& p, int skull_vertex) const {
     const CornerWeights at = surface.Locate(p, skull_vertex);
-    Eigen::VectorXd regressors = Eigen::VectorXd::Zero(1 + of_vertices.rows());
+    Eigen::VectorXd regressors = Eigen::VectorXd::Zero(1 + at_vertices.rows());
     regressors[0] = 1;
     for (int c = 0; c < 3; ++c) {
-      regressors.tail(of_vertices.rows()) += at.weights[c] * of_vertices.col(at.corners[c]);
+      regressors.tail(at_vertices.rows()) += at.weights[c] * at_vertices.col(at.corners[c]);
     }
     return regressors;
   }
 
   CoarseSurface surface;
   MeshQuery query;
-  Eigen::MatrixXd of_vertices;  // of the coarse surface
+  Eigen::MatrixXd at_vertices;  // at vertices of the coarse surface
 };
 
 MeanRegressors::MeanRegressors(DepthMean mean, std::string_view scheme, const DepthInput& input,
@@ -75,7 +74,7 @@ MeanRegressors::MeanRegressors(DepthMean mean, std::string_view scheme, const De
     : mean_(mean), input_(input) {
   if (mean == DepthMean::kTable && input.expected.empty()) {
     throw InputError(fmt::format(
-        "{}: `mean: table` needs the mean depths of a table beside the dowels' own, and there are "
+        "{}: `mean: table` needs the mean depths of a table besides the dowels' own, and there are "
         "none; name tissue.table and measured depths, or choose `mean: constant`",
         scheme));
   }
@@ -84,7 +83,7 @@ MeanRegressors::MeanRegressors(DepthMean mean, std::string_view scheme, const De
     const std::size_t places = DepthSamples(input.dowels).size();
     if (places < FewestDowels(mean)) {
       throw InputError(fmt::format(
-          "{}: `mean: {}` finds {} factors, for which {} are too few; place more, or choose `mean: "
+          "{}: `mean: {}` fits {} factors, for which {} are too few; place more, or choose `mean: "
           "constant`",
           scheme, EnumNames(mean)[static_cast<std::size_t>(mean)], FewestDowels(mean),
           places == 1 ? "1 dowel" : fmt::format("{} dowels", places)));
@@ -103,7 +102,7 @@ Eigen::MatrixXd MeanRegressors::At(std::span<const Vec3> points, const RunContex
   if (mean_ == DepthMean::kTable) {
     return ExpectedAt(points, input_.expected, run);
   }
-  Eigen::MatrixXd regressors(1 + bone_->of_vertices.rows(), count);
+  Eigen::MatrixXd regressors(1 + bone_->at_vertices.rows(), count);
   for (std::size_t k = 0; k < points.size(); ++k) {
     const MeshPoint on = bone_->query.Closest(points[k]);
     regressors.col(static_cast<Eigen::Index>(k)) =
@@ -116,7 +115,7 @@ Eigen::MatrixXd MeanRegressors::AtVertices(const RunContext& run) const {
   if (!LooksAtBone(mean_)) {
     return At(input_.skull.points, run);
   }
-  Eigen::MatrixXd regressors(1 + bone_->of_vertices.rows(), std::ssize(input_.skull.points));
+  Eigen::MatrixXd regressors(1 + bone_->at_vertices.rows(), std::ssize(input_.skull.points));
   ForEachVertex(input_, run, [&](std::size_t i) {
     regressors.col(static_cast<Eigen::Index>(i)) =
         bone_->At(input_.skull.points[i], static_cast<int>(i));

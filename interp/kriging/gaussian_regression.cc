@@ -7,7 +7,7 @@
 namespace semblance {
 namespace {
 
-constexpr double kFirstJitter = 1e-10;  // of the variance, on the diagonal
+constexpr double kFirstJitter = 1e-10;  // of the variance, on the diagonal; round-off
 
 double LogDeterminant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
   return 2 * factor.matrixLLT().diagonal().array().log().sum();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Values with a known covariance and a mean that is linear in known regressors: universal kriging.
+// Universal kriging: Gaussian values with a known covariance and a mean that is linear in known
+// regressors.
 #pragma once
 
 #include <Eigen/Cholesky>
@@ -7,36 +8,36 @@
 
 namespace semblance {
 
-// y ~ N(F b, V) with unknown b: n values, n x q regressors F of full rank, q <= n.
+// The model y ~ N(F b, V) with n values y, n x q regressors F of full rank (q <= n), and unknown b.
 class GaussianRegression {
  public:
-  // Where V is singular by rounding, or not positive definite, its diagonal grows by parts of
-  // `variance` until it is.
+  // If V is not positive definite, its diagonal is increased by ever larger fractions of `variance`
+  // until it is.
   GaussianRegression(const Eigen::MatrixXd& covariance, double variance, Eigen::VectorXd values,
                      Eigen::MatrixXd regressors);
 
-  // b, by generalised least squares.
+  // b by generalised least squares.
   const Eigen::VectorXd& coefficients() const { return coefficients_; }
-  // V^-1 (y - F b): what a covariance with the values is multiplied by.
+  // V^-1 (y - F b). The product with a point's covariances predicts the point's residual.
   const Eigen::VectorXd& weights() const { return weights_; }
-  // What V's diagonal grew by.
+  // The increase of V's diagonal.
   double added() const { return added_; }
   Eigen::VectorXd Solve(const Eigen::VectorXd& right) const { return factor_.solve(right); }
 
-  // r'V^-1 r, r = y - F b.
+  // r'V^-1 r with r = y - F b.
   double Misfit() const { return misfit_; }
-  // log |V| + log |F'V^-1 F| + r'V^-1 r, r = y - F b: minus twice the restricted log likelihood,
-  // but for a constant (Harville 1974).
+  // log |V| + log |F'V^-1 F| + r'V^-1 r with r = y - F b. This is minus twice the restricted log
+  // likelihood, up to a constant (Harville 1974).
   double Deviance() const;
-  // Its derivative along a change of V, n x n and symmetric.
+  // The derivative of the deviance along a symmetric change of V (n x n).
   double DevianceAlong(const Eigen::MatrixXd& change) const;
 
-  // Before Variance; costs the cube of n.
+  // Must be called before Variance; costs n^3.
   void PrepareVariance();
-  // Of the value at a point, given y: `with` are its covariances with the values, `regressors` its
-  // own (q), `own` its variance.
+  // The variance of the value at a point, given y. with: the point's covariances with the values;
+  // regressors: the point's regressors (q); own: the point's prior variance.
   double Variance(const Eigen::VectorXd& with, const Eigen::VectorXd& regressors, double own) const;
-  // The same of m points together: with n x m, regressors q x m, own m x m.
+  // The covariance of m points, given y. with: n x m; regressors: q x m; own: m x m.
   Eigen::MatrixXd Covariance(const Eigen::MatrixXd& with, const Eigen::MatrixXd& regressors,
                              const Eigen::MatrixXd& own) const;
 

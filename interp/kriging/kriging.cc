@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "interp/kriging/kriging_likelihood.h"
 #include "interp/kriging/kriging_process.h"
 #include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -12,9 +11,10 @@
 namespace semblance {
 namespace {
 
-constexpr Eigen::Index kFitSamples = 200;  // enough for two numbers; the cost grows by the cube
+constexpr Eigen::Index kFitSamples = 200;  // enough to determine two numbers; the cost grows with
+                                           // the cube
 
-// The dowels' data and, along the bone, the way from each of them to each vertex.
+// The dowels' data and, for geodesic distances, the distance from each dowel to each vertex.
 struct KrigingScene {
   KrigingData data;
   std::vector<Vec3> bases;
@@ -32,7 +32,8 @@ struct KrigingScene {
   }
 };
 
-// To the surface's points at the dowels' bases, by what is known at the corners around them.
+// Computes geodesic distances from each dowel to the vertices and, by interpolation between a
+// triangle's corners, to the other dowels.
 void FindGeodesics(const DepthInput& input, const std::vector<DepthSample>& samples,
                    const RunContext& run, KrigingScene& scene) {
   const auto n = static_cast<Eigen::Index>(samples.size());
@@ -48,7 +49,7 @@ void FindGeodesics(const DepthInput& input, const std::vector<DepthSample>& samp
     const MeshPoint at = query.Closest(samples[j].base);
     scene.data.distance_mm.row(j).setZero();
     for (int corner = 0; corner < 3; ++corner) {
-      if (at.weights[corner] > 0) {  // none of an infinite way
+      if (at.weights[corner] > 0) {  // 0 times infinity is NaN
         const int vertex = input.skull.triangles[at.triangle][corner];
         scene.data.distance_mm.row(j) +=
             at.weights[corner] * scene.to_vertex_mm.col(vertex).transpose();
@@ -58,9 +59,9 @@ void FindGeodesics(const DepthInput& input, const std::vector<DepthSample>& samp
   }
 }
 
-KrigingScene SceneOf(const Kriging& options, const DepthInput& input,
-                     const std::vector<DepthSample>& samples, const MeanRegressors& mean,
-                     const RunContext& run) {
+KrigingScene MakeScene(const Kriging& options, const DepthInput& input,
+                       const std::vector<DepthSample>& samples, const MeanRegressors& mean,
+                       const RunContext& run) {
   const auto n = static_cast<Eigen::Index>(samples.size());
   KrigingScene scene{
       {Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd(n), Eigen::MatrixXd()}, {}, {}};
@@ -92,8 +93,8 @@ KrigingHyper HyperFor(const Kriging& options, const KrigingScene& scene, const R
                   run);
 }
 
-DepthProcess ProcessOf(const KrigingHyper& hyper, const KrigingScene& scene,
-                       const KrigingProcess& process) {
+DepthProcess DescribeProcess(const KrigingHyper& hyper, const KrigingScene& scene,
+                             const KrigingProcess& process) {
   return {hyper.length_mm, hyper.signal_mm, 0,
           (scene.data.regressors * process.coefficients()).mean(), hyper.at_end};
 }
@@ -103,9 +104,9 @@ DepthProcess ProcessOf(const KrigingHyper& hyper, const KrigingScene& scene,
 DepthProcess FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run) {
   CheckDepthInput(input);
   const MeanRegressors mean(options.mean, Kriging::kName, input, run);
-  const KrigingScene scene = SceneOf(options, input, DepthSamples(input.dowels), mean, run);
+  const KrigingScene scene = MakeScene(options, input, DepthSamples(input.dowels), mean, run);
   const KrigingHyper hyper = HyperFor(options, scene, run);
-  return ProcessOf(hyper, scene, KrigingProcess(options.covariance, scene.data, hyper));
+  return DescribeProcess(hyper, scene, KrigingProcess(options.covariance, scene.data, hyper));
 }
 
 DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
@@ -114,7 +115,7 @@ DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
   Kriging straight = options;
   straight.distance = DowelDistance::kEuclidean;
   const MeanRegressors mean(options.mean, Kriging::kName, input, run);
-  const KrigingScene scene = SceneOf(straight, input, DepthSamples(input.dowels), mean, run);
+  const KrigingScene scene = MakeScene(straight, input, DepthSamples(input.dowels), mean, run);
   const auto count = static_cast<Eigen::Index>(points.size());
   Eigen::MatrixXd to_dowels_mm(scene.data.depth_mm.size(), count), between_mm(count, count);
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -134,7 +135,7 @@ DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
   const std::vector<DepthSample> samples = DepthSamples(input.dowels);
   const DepthLimits limits(samples, options.clamp);
   const MeanRegressors mean(options.mean, Kriging::kName, input, run);
-  const KrigingScene scene = SceneOf(options, input, samples, mean, run);
+  const KrigingScene scene = MakeScene(options, input, samples, mean, run);
   const Eigen::MatrixXd regressors = mean.AtVertices(run);
   const KrigingHyper hyper = HyperFor(options, scene, run);
   KrigingProcess process(options.covariance, scene.data, hyper);
@@ -145,13 +146,13 @@ DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
       AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
         const Eigen::VectorXd distance_mm = scene.DistancesTo(input.skull.points[i], i);
         if (!std::isfinite(distance_mm.minCoeff())) {
-          return DepthValue{};  // no dowel is reached along the bone
+          return DepthValue{};  // no dowel can be reached along the bone
         }
         const DepthValue value =
             process.ValueAt(distance_mm, regressors.col(static_cast<Eigen::Index>(i)));
         return DepthValue{limits(value.mm), value.sd_mm};
       });
-  field.process = ProcessOf(hyper, scene, process);
+  field.process = DescribeProcess(hyper, scene, process);
   return field;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Kriging: tissue depth as a Gaussian process in space, with a standard deviation; ordinary where
-// its mean is constant, else universal.
+// Kriging: tissue depth as a Gaussian process in space, with a standard deviation. A constant mean
+// gives ordinary kriging, other means universal kriging.
 #pragma once
 
 #include <Eigen/Core>
@@ -12,7 +12,6 @@
 #include "interp/dowels/depth_input.h"
 #include "interp/dowels/dowel_samples.h"
 #include "interp/kriging/depth_mean.h"
-#include "interp/kriging/process_fields.h"
 #include "interp/on_surface/surface_distance.h"
 
 namespace semblance {
@@ -25,34 +24,36 @@ constexpr auto EnumNames(Covariance) {
 
 struct Kriging {
   static constexpr std::string_view kName = "kriging";
-  Covariance covariance = Covariance::kMatern32;       // smoother ones oscillate between far dowels
-  DowelDistance distance = DowelDistance::kEuclidean;  // or along the bone
-  DepthMean mean = DepthMean::kConstant;               // what the depths vary around
-  std::optional<double> length_mm = std::nullopt;      // none: by maximum likelihood
-  double length_prior_mm = 60;                         // median; dowels alone do not fix a length
-  double length_prior_spread = 0.5;                    // sd of the logarithm
-  std::optional<double> signal_mm = std::nullopt;      // none: by maximum likelihood
-  double nugget_share = 1;                             // of a dowel's sd_mm; 0 honours every dowel
-  bool clamp = true;                                   // to the dowels' range
-  bool state_sd = true;                                // sd_mm per vertex
-  double max_angle_deg = 90;                           // further turned bone gets no depth
+  Covariance covariance = Covariance::kMatern32;
+  DowelDistance distance = DowelDistance::kEuclidean;
+  DepthMean mean = DepthMean::kConstant;
+  std::optional<double> length_mm = std::nullopt;
+  double length_prior_mm = 60;
+  double length_prior_spread = 0.5;
+  std::optional<double> signal_mm = std::nullopt;
+  double nugget_share = 1;
+  bool clamp = true;
+  bool state_sd = true;
+  double max_angle_deg = 90;
 };
 template <class Visitor>
 void Fields(Visitor& visit, Kriging& o) {
   visit(FieldInfo{.name = "covariance",
-                  .doc = "of two depths by the distance between their bases, from rough "
+                  .doc = "covariance of two depths by the distance of their bases, from rough "
                          "(matern_1_2, an exponential) to very smooth (squared_exponential, which "
-                         "oscillates between dowels that are far apart)"},
+                         "oscillates between distant dowels)"},
         o.covariance);
   DistanceField(visit, o.distance);
   MeanField(visit, o.mean);
-  visit(FieldInfo{.name = "length_mm",
-                  .unit = "mm",
-                  .min = 1,
-                  .max = 1e4,
-                  .doc = "distance over which depths resemble each other; none: by maximum "
-                         "likelihood with the prior below"},
-        o.length_mm);
+  visit(
+      FieldInfo{
+          .name = "length_mm",
+          .unit = "mm",
+          .min = 1,
+          .max = 1e4,
+          .doc =
+              "correlation length of the depths; none: by maximum likelihood with the prior below"},
+      o.length_mm);
   LengthPriorFields(visit, o.length_prior_mm, o.length_prior_spread);
   SignalField(visit, o.signal_mm);
   NuggetShareField(visit, o.nugget_share);
@@ -61,31 +62,32 @@ void Fields(Visitor& visit, Kriging& o) {
   MaxAngleField(visit, o.max_angle_deg);
 }
 
-// The maximum of the restricted likelihood times the prior (kriging_likelihood.h). Of more than 200
-// dowels it uses 200 that lie far apart. Throws as InterpolateDepth.
+// Maximises the restricted likelihood times the prior (FitHyper in kriging_process.h). It uses at
+// most 200 dowels, which lie far apart. Throws as InterpolateDepth does.
 DepthProcess FitKriging(const Kriging& options, const DepthInput& input, const RunContext& run);
 
-// Of the depths at some points, given the dowels, the model and the uncertain mean.
+// The distribution of the depths at some points, given the dowels, the model and the uncertain
+// mean.
 struct DepthPosterior {
   Eigen::VectorXd mean_mm;     // without `clamp`
-  Eigen::MatrixXd covariance;  // mm^2, symmetric; its diagonal is the square of the sd_mm below,
-                               // but with too few dowels, which state none, of the least signal
+  Eigen::MatrixXd covariance;  // mm^2, symmetric; its diagonal is sd_mm^2 of InterpolateDepth (with
+                               // too few dowels for an sd, that of the smallest signal)
 };
 
-// By straight distances, also where `options` says along the bone. Throws InputError as
-// CheckDepthInput.
+// Computes the distribution with straight distances, also if `options` has geodesic distances.
+// Throws InputError as CheckDepthInput does.
 DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
                                 std::span<const Vec3> points, const RunContext& run);
 
-// Far from all dowels the depth is the process's mean there. sd_mm is that of the process at the
-// vertex, given the dowels, the model and the uncertain mean; it does not hold the nugget of a
-// further measurement there, nor the uncertainty of length and signal. It is NaN where none is
-// known: everywhere if the dowels are no more than the mean has factors and signal_mm is not given,
-// and where the variance along the bone comes out below 0, but at a dowel that the field goes
-// through. kNotFacing as AssignWhereFacing; kOutside where no dowel is reached along the bone.
-// There the smoother covariances are not always definite; then the field smooths, and may miss
-// certain dowels. It keeps 8 bytes per vertex and dowel. Throws InputError as CheckDepthInput, or
-// if the skull has no triangle to go along.
+// Far from all dowels the depth is the process's mean. sd_mm is the sd of the process at the
+// vertex, given the dowels, the model and the uncertain mean. It excludes the nugget of another
+// measurement at the vertex and the uncertainty of length and signal. It is NaN everywhere if there
+// are no more dowels than factors of the mean and signal_mm is not given. Geodesic distances:
+// vertices from which no dowel is reached along the bone get kOutside. The smoother covariances are
+// not always positive definite; then the field smooths and may miss certain dowels, and sd_mm is
+// NaN where the variance is negative (except at an interpolated dowel). Needs 8 bytes per vertex
+// and dowel. kNotFacing as in AssignWhereFacing. Throws InputError as CheckDepthInput does, or if
+// geodesic distances are requested and the skull has no triangle.
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input, const RunContext& run);
 
 }  // namespace semblance

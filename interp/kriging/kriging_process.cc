@@ -1,15 +1,45 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/kriging/kriging_process.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
 namespace semblance {
 namespace {
 
-constexpr double kRounding = 1e-6;   // of the variance: what is left of a definite process's 0
-constexpr double kMissed_mm = 1e-2;  // further off a field does not go through a dowel
+constexpr double kRounding = 1e-6;    // of the variance; round-off in a variance of 0
+constexpr double kMaxMiss_mm = 1e-2;  // a field that misses a dowel by more does not interpolate it
+
+constexpr double kFlatDepths_mm = 1e-3;  // lower bound of the depths' spread
+
+// The ranges of the two logarithms.
+SearchRange SearchBounds(const Kriging& options, const KrigingData& data) {
+  const double prior = std::log(options.length_prior_mm);
+  const double spread = DepthSpread(data.depth_mm);
+  SearchRange bounds{Vec2(prior - 3, std::log(spread / 30)),
+                     Vec2(prior + 3, std::log(spread * 10))};
+  if (options.length_mm) {
+    bounds.low[0] = bounds.high[0] = std::log(*options.length_mm);
+  }
+  if (options.signal_mm) {
+    bounds.low[1] = bounds.high[1] = std::log(*options.signal_mm);
+  }
+  return bounds;
+}
+
+KrigingHyper MakeHyper(const Eigen::VectorXd& logs) {
+  return {std::exp(logs[0]), std::exp(logs[1])};
+}
+
+// The misfit for correlations without nuggets.
+double MisfitAt(const Kriging& options, KrigingData data, double length_mm) {
+  data.nugget_mm2.setZero();
+  return KrigingProcess(options.covariance, data, {length_mm, 1}).Misfit();
+}
 
 }  // namespace
 
@@ -64,9 +94,9 @@ GaussianRegression KrigingProcess::Regression(const KrigingData& data) {
   return {matrix, variance_mm2_, data.depth_mm, data.regressors};
 }
 
-// With ways that are not quite symmetric, and a diagonal that had to grow, the field misses the
-// dowels a little; it is brought nearer to them for as long as that helps. To solve the equations
-// of the ways themselves would be exact and wild: they need not be definite.
+// With slightly asymmetric distances and an increased diagonal the field misses the dowels a
+// little. Iterative refinement moves it closer, as long as this helps. Solving the asymmetric
+// equations directly would be exact but unstable, because they need not be definite.
 void KrigingProcess::FindWeights(const KrigingData& data) {
   constexpr int kRounds = 20;
   weights_ = regression_.weights();
@@ -108,7 +138,7 @@ bool KrigingProcess::IsThroughDowel(const Eigen::Ref<const Eigen::VectorXd>& dis
                                     double depth_mm) const {
   Eigen::Index nearest = 0;
   return distance_mm.minCoeff(&nearest) == 0 &&
-         std::abs(depth_mm - dowel_depth_mm_[nearest]) < kMissed_mm;
+         std::abs(depth_mm - dowel_depth_mm_[nearest]) < kMaxMiss_mm;
 }
 
 DepthValue KrigingProcess::ValueAt(const Eigen::Ref<const Eigen::VectorXd>& distance_mm,
@@ -130,6 +160,64 @@ DepthPosterior KrigingProcess::Posterior(const Eigen::MatrixXd& to_dowels_mm,
   const Eigen::MatrixXd with = CovarianceAt(to_dowels_mm);
   return {regressors.transpose() * coefficients() + with.transpose() * weights_,
           regression_.Covariance(with, regressors, CovarianceAt(between_mm))};
+}
+
+std::vector<std::string> DescribeRangeEnds(std::span<const std::string_view> names,
+                                           const SearchRange& bounds, const SmoothCost& cost,
+                                           const Eigen::VectorXd& logs) {
+  std::vector<std::string> words;
+  for (Eigen::Index k = 0; k < std::ssize(names); ++k) {
+    const RangeEnd end = EndOfRange(bounds, cost, logs, k);
+    if (end != RangeEnd::kNone) {
+      words.push_back(fmt::format("the {}, {:.3g} mm, is the {} that is searched", names[k],
+                                  std::exp(logs[k]), end == RangeEnd::kLow ? "least" : "greatest"));
+    }
+  }
+  return words;
+}
+
+Eigen::VectorXd FindLogs(SearchRange& bounds, const SmoothCost& cost,
+                         const std::function<double(double)>& misfit_mm2, const RunContext& run) {
+  constexpr Eigen::Index kSignal = 1;
+  const Eigen::VectorXd logs = FindMinimum(bounds, cost, run);
+  if (EndOfRange(bounds, cost, logs, kSignal) != RangeEnd::kHigh) {
+    return logs;
+  }
+  const double most = misfit_mm2(std::exp(bounds.high[0]));
+  bounds.high[kSignal] = std::max(bounds.high[kSignal], std::log(4 * most) / 2);
+  const Eigen::VectorXd wider = FindMinimum(bounds, cost, run);
+  return cost(wider, nullptr) < cost(logs, nullptr) ? wider : logs;
+}
+
+bool KnowsSignal(const std::optional<double>& signal_mm, const Eigen::MatrixXd& regressors) {
+  return signal_mm.has_value() || regressors.rows() > regressors.cols();
+}
+
+double DepthSpread(const Eigen::VectorXd& depth_mm) {
+  const double mean = depth_mm.mean();
+  return std::max(std::sqrt((depth_mm.array() - mean).square().mean()), kFlatDepths_mm);
+}
+
+KrigingHyper FitHyper(const Kriging& options, const KrigingData& data, const RunContext& run) {
+  constexpr std::array<std::string_view, 2> kNames = {"length", "signal"};
+  if (options.length_mm && options.signal_mm) {
+    return {*options.length_mm, *options.signal_mm};
+  }
+  const auto cost = [&](const Eigen::VectorXd& logs, Eigen::VectorXd* gradient) {
+    const KrigingProcess process(options.covariance, data, MakeHyper(logs));
+    const double away = (logs[0] - std::log(options.length_prior_mm)) / options.length_prior_spread;
+    if (gradient != nullptr) {
+      *gradient = process.DevianceGradient();
+      (*gradient)[0] += 2 * away / options.length_prior_spread;
+    }
+    return process.Deviance() + away * away;
+  };
+  SearchRange bounds = SearchBounds(options, data);
+  const Eigen::VectorXd logs = FindLogs(
+      bounds, cost, [&](double length_mm) { return MisfitAt(options, data, length_mm); }, run);
+  KrigingHyper hyper = MakeHyper(logs);
+  hyper.at_end = DescribeRangeEnds(kNames, bounds, cost, logs);
+  return hyper;
 }
 
 }  // namespace semblance

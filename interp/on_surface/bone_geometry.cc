@@ -12,7 +12,8 @@
 #include <numeric>
 #include <string>
 
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
+#include "interp/on_surface/matern_field.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -22,8 +23,8 @@ namespace {
 using HullKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using HullMesh = CGAL::Surface_mesh<HullKernel::Point_3>;
 
-// Of flat faces each may have many corners.
-TriMesh ConvexHullOf(const TriMesh& mesh) {
+// The convex hull; its flat faces, which may have many corners, become fans of triangles.
+TriMesh ConvexHull(const TriMesh& mesh) {
   std::vector<HullKernel::Point_3> points;
   for (const Vec3& p : mesh.points) {
     points.emplace_back(p.x(), p.y(), p.z());
@@ -55,7 +56,7 @@ std::map<std::string, Vec3> BasesBySite(std::span<const Dowel> dowels) {
   return bases;
 }
 
-// The sum over pairs; zero without one.
+// The sum of the vectors from right to left over pairs; zero without a pair.
 Vec3 LeftOfPairs(const std::map<std::string, Vec3>& bases) {
   Vec3 sum = Vec3::Zero();
   for (const auto& [site, base] : bases) {
@@ -67,7 +68,8 @@ Vec3 LeftOfPairs(const std::map<std::string, Vec3>& bases) {
   return sum;
 }
 
-// Across the plane of the dowels in the midline; zero with fewer than three, or none beside them.
+// The direction to the left, normal to the plane of the midline dowels; zero with fewer than three
+// of them, or none beside them.
 Vec3 LeftOfMidline(std::span<const Dowel> dowels) {
   std::vector<Vec3> midline;
   for (const Dowel& dowel : dowels) {
@@ -94,7 +96,7 @@ Vec3 LeftOfMidline(std::span<const Dowel> dowels) {
   return to_left * across;
 }
 
-std::vector<Vec3> OrbitsOf(const std::map<std::string, Vec3>& bases) {
+std::vector<Vec3> FindOrbits(const std::map<std::string, Vec3>& bases) {
   std::vector<Vec3> centers;
   for (const char* side : {"_l", "_r"}) {
     const auto above = bases.find(std::string("mso") + side),
@@ -118,7 +120,7 @@ Vec3 MeanBase(std::span<const Dowel> dowels) {
 
 }  // namespace
 
-HeadFrame FrameOfHead(std::span<const Dowel> dowels) {
+HeadFrame FindHeadFrame(std::span<const Dowel> dowels) {
   const std::map<std::string, Vec3> bases = BasesBySite(dowels);
   const Vec3 of_pairs = LeftOfPairs(bases);
   const Vec3 leftward = of_pairs.norm() > 0 ? of_pairs : LeftOfMidline(dowels);
@@ -130,12 +132,12 @@ HeadFrame FrameOfHead(std::span<const Dowel> dowels) {
   }
   if (!(leftward.norm() > 0) || !(forward.norm() > 0)) {
     throw InputError(
-        "where a place lies in the head is told by dowels of a pair, or by three in the midline "
-        "and one beside it; place them, or choose another mean");
+        "the axes of the head need a pair of dowels (left and right), or three in the midline and "
+        "one beside it; place them, or choose another mean");
   }
   frame.front = forward.normalized();
   frame.up = frame.front.cross(frame.left);
-  frame.orbits = OrbitsOf(bases);
+  frame.orbits = FindOrbits(bases);
   if (frame.orbits.empty()) {
     frame.orbits = {MeanBase(dowels)};
   }
@@ -144,7 +146,7 @@ HeadFrame FrameOfHead(std::span<const Dowel> dowels) {
 
 Eigen::MatrixXd BoneGeometry(const TriMesh& mesh, const HeadFrame& frame) {
   const std::vector<Vec3> normals = VertexNormals(mesh);
-  const MeshQuery hull(ConvexHullOf(mesh));
+  const MeshQuery hull(ConvexHull(mesh));
   Eigen::MatrixXd geometry(kBoneGeometry, std::ssize(mesh.points));
   for (std::size_t v = 0; v < mesh.points.size(); ++v) {
     const Vec3& p = mesh.points[v];
@@ -158,4 +160,24 @@ Eigen::MatrixXd BoneGeometry(const TriMesh& mesh, const HeadFrame& frame) {
   return geometry;
 }
 
+Eigen::MatrixXd BoneRelief(const TriMesh& mesh, std::span<const double> scales_mm) {
+  const std::vector<Vec3> normals = VertexNormals(mesh);
+  const MeshLaplacian laplacian = BuildLaplacian(mesh);
+  const auto count = std::ssize(mesh.points);
+  Eigen::MatrixXd points(count, 3);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    points.row(i) = mesh.points[static_cast<std::size_t>(i)].transpose();
+  }
+  Eigen::MatrixXd relief(std::ssize(scales_mm), count);
+  for (std::size_t k = 0; k < scales_mm.size(); ++k) {
+    const double shift = 1 / (scales_mm[k] * scales_mm[k]);
+    const MeshSolver solver(mesh.points, ShiftedStiffness(laplacian, shift));
+    const Eigen::MatrixXd smooth = solver.Solve(shift * (laplacian.area_mm2.asDiagonal() * points));
+    for (Eigen::Index i = 0; i < count; ++i) {
+      relief(static_cast<Eigen::Index>(k), i) =
+          (smooth.row(i) - points.row(i)).dot(normals[static_cast<std::size_t>(i)]);
+    }
+  }
+  return relief;
+}
 }  // namespace semblance

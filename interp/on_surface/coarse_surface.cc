@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 #include <queue>
 #include <utility>
 
@@ -11,41 +12,16 @@
 namespace semblance {
 namespace {
 
-constexpr double kSameWay_mm = 1e-6;  // of two ways that are as long the first counts
+constexpr double kSameWay_mm = 1e-6;  // round-off: of two equally long paths the first counts
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-// Lists of integers, one after the other.
-struct Lists {
-  std::vector<int> first, items;
-};
-
-// Of each vertex the triangles around it.
-Lists TrianglesAround(const TriMesh& mesh) {
-  Lists lists{std::vector<int>(mesh.points.size() + 1, 0),
-              std::vector<int>(3 * mesh.triangles.size())};
-  for (const Triangle& t : mesh.triangles) {
-    for (const int v : t) {
-      ++lists.first[v + 1];
-    }
-  }
-  for (std::size_t v = 0; v < mesh.points.size(); ++v) {
-    lists.first[v + 1] += lists.first[v];
-  }
-  std::vector<int> next = lists.first;
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const int v : mesh.triangles[t]) {
-      lists.items[next[v]++] = static_cast<int>(t);
-    }
-  }
-  return lists;
-}
-
-// Cells around vertices that are taken in the order of their indices, wherever none is near.
+// Divides the skull into cells. In index order, each vertex that is in no cell yet becomes the
+// center of a new one.
 class Cover {
  public:
   Cover(const TriMesh& skull, double edge_mm, const RunContext& run)
       : skull_(skull),
-        around_(TrianglesAround(skull)),
+        around_(skull),
         way_mm_(skull.points.size(), kFar),
         cell(skull.points.size(), -1) {
     for (int v = 0; v < static_cast<int>(cell.size()); ++v) {
@@ -57,7 +33,8 @@ class Cover {
   }
 
  private:
-  // Takes what lies within edge_mm of v, and nearer to it than to those before.
+  // Makes the cell of v: the vertices within edge_mm of v that are nearer to v than to earlier
+  // centers.
   void Grow(int v, double edge_mm) {
     const auto index = static_cast<int>(centers.size());
     centers.push_back(v);
@@ -68,8 +45,8 @@ class Cover {
       if (way_mm > way_mm_[at]) {
         continue;
       }
-      for (int k = around_.first[at]; k < around_.first[at + 1]; ++k) {
-        for (const int to : skull_.triangles[around_.items[k]]) {
+      for (const int t : around_.At(at)) {
+        for (const int to : skull_.triangles[t]) {
           const double on_mm = way_mm + (skull_.points[to] - skull_.points[at]).norm();
           if (on_mm <= edge_mm) {
             Offer(to, on_mm, index);
@@ -89,18 +66,18 @@ class Cover {
 
   using Entry = std::pair<double, int>;
   const TriMesh& skull_;
-  Lists around_;
+  VertexTriangles around_;
   std::vector<double> way_mm_;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open_;
 
  public:
-  std::vector<int> cell;     // of each vertex
-  std::vector<int> centers;  // of each cell
+  std::vector<int> cell;     // per vertex
+  std::vector<int> centers;  // per cell
 };
 
-// A triangle wherever three cells meet, once.
+// Makes one triangle for each three cells that meet.
 std::vector<Triangle> DualTriangles(const TriMesh& skull, const std::vector<int>& cell) {
-  std::vector<std::pair<Triangle, Triangle>> found;  // sorted corners, and as they are
+  std::vector<std::pair<Triangle, Triangle>> found;  // sorted corners, and oriented corners
   for (const Triangle& t : skull.triangles) {
     const Triangle dual = {cell[t[0]], cell[t[1]], cell[t[2]]};
     if (dual[0] != dual[1] && dual[1] != dual[2] && dual[2] != dual[0]) {
@@ -121,6 +98,22 @@ std::vector<Triangle> DualTriangles(const TriMesh& skull, const std::vector<int>
 
 }  // namespace
 
+VertexTriangles::VertexTriangles(const TriMesh& mesh)
+    : first_(mesh.points.size() + 1, 0), triangles_(3 * mesh.triangles.size()) {
+  for (const Triangle& t : mesh.triangles) {
+    for (const int v : t) {
+      ++first_[v + 1];
+    }
+  }
+  std::partial_sum(first_.begin(), first_.end(), first_.begin());
+  std::vector<int> next = first_;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    for (const int v : mesh.triangles[t]) {
+      triangles_[next[v]++] = static_cast<int>(t);
+    }
+  }
+}
+
 int NearestCorner(const TriMesh& mesh, const MeshPoint& on) {
   return *std::ranges::min_element(mesh.triangles[on.triangle], {}, [&](int i) {
     return std::pair((mesh.points[i] - on.position).squaredNorm(), i);
@@ -134,16 +127,14 @@ CoarseSurface::CoarseSurface(const TriMesh& skull, double edge_mm, const RunCont
   }
   mesh_.triangles = DualTriangles(skull, cover.cell);
   cell_ = std::move(cover.cell);
-  Lists around = TrianglesAround(mesh_);
-  first_at_ = std::move(around.first);
-  triangles_at_ = std::move(around.items);
+  triangles_at_ = VertexTriangles(mesh_);
 }
 
 CornerWeights CoarseSurface::Locate(const Vec3& p, int skull_vertex) const {
   const int center = cell_[skull_vertex];
   CornerWeights best{{center, center, center}, {1, 0, 0}};
   double least = kFar;
-  for (const int t : TrianglesAt(center)) {
+  for (const int t : triangles_at_.At(center)) {
     const Triangle& corners = mesh_.triangles[t];
     const TrianglePoint on = ClosestPointOnTriangle(
         p, mesh_.points[corners[0]], mesh_.points[corners[1]], mesh_.points[corners[2]]);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A skull's surface with fewer vertices: as many as a smooth field needs.
+// A skull's surface with only as many vertices as a smooth field needs.
 #pragma once
 
 #include <array>
@@ -12,40 +12,51 @@
 
 namespace semblance {
 
-// A point of a mesh by its values at three vertices; fewer where weights are 0.
+// The triangles around each vertex of a mesh.
+class VertexTriangles {
+ public:
+  VertexTriangles() = default;
+  explicit VertexTriangles(const TriMesh& mesh);
+
+  std::span<const int> At(int vertex) const {
+    return {triangles_.data() + first_[vertex],
+            static_cast<std::size_t>(first_[vertex + 1] - first_[vertex])};
+  }
+
+ private:
+  std::vector<int> first_, triangles_;
+};
+
+// A point of a mesh as a weighted mean of three vertices (fewer if weights are 0).
 struct CornerWeights {
   std::array<int, 3> corners = {0, 0, 0};
   Vec3 weights = Vec3(1, 0, 0);  // >= 0, sum 1
 };
 
-// The corner of the point's triangle that is nearest to it; the first of equal ones.
+// The corner of the point's triangle that is nearest to the point; on a tie, the lowest index.
 int NearestCorner(const TriMesh& mesh, const MeshPoint& on);
 
-// The vertices of `mesh` are vertices of the skull, no two of them within the edge length along the
-// skull's edges. Each of the skull's vertices belongs to the cell of the nearest of them; where
-// three cells meet, `mesh` has a triangle (the dual of the cells, a Delaunay triangulation along
-// the surface). So two sides of a thin wall stay apart, slivers are gone, and a skull whose edges
-// are all longer comes out as it was. A strip narrower than the edge length may come apart.
+// A coarse mesh. Its vertices are vertices of the skull, no two of them closer than the edge length
+// along the skull's edges. Each of the skull's vertices belongs to the cell of the nearest coarse
+// vertex. The mesh has a triangle wherever three cells meet, so that it is the dual of the cells
+// and a Delaunay triangulation along the surface. The two sides of a thin wall stay separate,
+// slivers vanish, and a skull whose edges are all longer does not change. A strip narrower than the
+// edge length may fall apart.
 class CoarseSurface {
  public:
-  // edge_mm >= 0; 0: the skull itself. Throws Cancelled if stopped.
+  // edge_mm >= 0; 0 keeps the skull. Throws Cancelled if stopped.
   CoarseSurface(const TriMesh& skull, double edge_mm, const RunContext& run);
 
   const TriMesh& mesh() const { return mesh_; }
 
-  // Where the mesh is closest to p, among the triangles around the cell of one of the skull's
-  // vertices that is near p.
+  // The point of the coarse mesh closest to p, among the triangles around the cell of a skull's
+  // vertex that is near p.
   CornerWeights Locate(const Vec3& p, int skull_vertex) const;
 
  private:
-  std::span<const int> TrianglesAt(int vertex) const {
-    return {triangles_at_.data() + first_at_[vertex],
-            static_cast<std::size_t>(first_at_[vertex + 1] - first_at_[vertex])};
-  }
-
   TriMesh mesh_;
-  std::vector<int> cell_;                     // of each of the skull's vertices
-  std::vector<int> first_at_, triangles_at_;  // the triangles of each vertex of mesh_
+  std::vector<int> cell_;         // per vertex of the skull
+  VertexTriangles triangles_at_;  // of mesh_
 };
 
 }  // namespace semblance

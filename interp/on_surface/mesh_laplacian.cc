@@ -8,23 +8,23 @@
 namespace semblance {
 namespace {
 
-constexpr double kMostCotangent = 100;
-constexpr double kLeastEdge = 1e-4;  // of an edge's two half cotangents
-constexpr double kLeastArea = 1e-2;  // of the mean
+constexpr double kMaxCotangent = 100;    // an angle of 0.6 degrees
+constexpr double kMinEdgeWeight = 1e-4;  // sum of an edge's two half cotangents; 0 would disconnect
+constexpr double kMinAreaShare = 1e-2;   // of the mean area
 
-// Of the corner `at`.
+// The cotangent of the angle at the corner `at`.
 double Cotangent(const Vec3& at, const Vec3& b, const Vec3& c) {
   const Vec3 to_b = b - at, to_c = c - at;
   const double sine = to_b.cross(to_c).norm(), cosine = to_b.dot(to_c);
-  if (std::abs(cosine) >= kMostCotangent * sine) {
-    return cosine < 0 ? -kMostCotangent : kMostCotangent;
+  if (std::abs(cosine) >= kMaxCotangent * sine) {
+    return cosine < 0 ? -kMaxCotangent : kMaxCotangent;
   }
   return cosine / sine;
 }
 
 using Entries = std::vector<Eigen::Triplet<double>>;
 
-// Half cotangents between vertices, those of an edge's triangles summed.
+// The sum of the half cotangents of an edge's triangles, per pair of vertices.
 Eigen::SparseMatrix<double> EdgeWeights(const TriMesh& mesh) {
   Entries entries;
   entries.reserve(6 * mesh.triangles.size());
@@ -45,12 +45,12 @@ Eigen::SparseMatrix<double> EdgeWeights(const TriMesh& mesh) {
   return weights;
 }
 
-// Above 0, also of a vertex without a triangle.
+// The areas of vertices, > 0 also for a vertex without a triangle.
 Eigen::VectorXd PositiveAreas(const TriMesh& mesh) {
   const std::vector<double> areas = VertexAreas(mesh);
   const auto count = static_cast<double>(std::max<std::size_t>(areas.size(), 1));
   const double mean = std::accumulate(areas.begin(), areas.end(), 0.0) / count;
-  const double least = mean > 0 ? kLeastArea * mean : 1;
+  const double least = mean > 0 ? kMinAreaShare * mean : 1;
   Eigen::VectorXd positive(static_cast<Eigen::Index>(areas.size()));
   for (Eigen::Index i = 0; i < positive.size(); ++i) {
     positive[i] = std::max(areas[i], least);
@@ -68,7 +68,7 @@ MeshLaplacian BuildLaplacian(const TriMesh& mesh) {
   for (int column = 0; column < matrix.outerSize(); ++column) {
     double sum = 0;
     for (Eigen::SparseMatrix<double>::InnerIterator it(matrix, column); it; ++it) {
-      it.valueRef() = -std::max(it.value(), kLeastEdge);
+      it.valueRef() = -std::max(it.value(), kMinEdgeWeight);
       sum -= it.value();
     }
     diagonal.emplace_back(column, column, sum);
@@ -80,7 +80,7 @@ MeshLaplacian BuildLaplacian(const TriMesh& mesh) {
   return laplacian;
 }
 
-std::vector<int> LabelComponents(const Eigen::SparseMatrix<double>& stiffness) {
+std::vector<int> LabelPieces(const Eigen::SparseMatrix<double>& stiffness) {
   std::vector<int> piece(static_cast<std::size_t>(stiffness.cols()), -1);
   int count = 0;
   std::vector<int> open;

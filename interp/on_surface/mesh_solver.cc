@@ -10,9 +10,10 @@
 namespace semblance {
 namespace {
 
-constexpr std::size_t kLeaf = 64;  // unknowns not worth a further cut
+constexpr std::size_t kLeaf = 64;  // parts of so many unknowns are not divided further
 
-// Nested dissection by the points' coordinates: two halves, and last what separates them.
+// Nested dissection by coordinates: each part is ordered as two halves, followed by their
+// separator.
 class Dissection {
  public:
   Dissection(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& pattern)
@@ -23,14 +24,14 @@ class Dissection {
   }
 
   struct Node {
-    int begin = 0, end = 0;  // its own unknowns, in the order
-    bool is_leaf = false;    // else its two children are the last two subtrees before it
+    int begin = 0, end = 0;  // its own unknowns, as positions in the order
+    bool is_leaf = false;    // otherwise its children are the two subtrees before it
   };
-  std::vector<int> order;   // of elimination
-  std::vector<Node> nodes;  // children before parents
+  std::vector<int> order;   // order of elimination
+  std::vector<Node> nodes;  // children precede their parents
 
  private:
-  // Orders `part`: one half, the other half, and last what separates them.
+  // Orders `part` as its first half, its second half, and the separator.
   void Cut(std::span<int> part) {
     const auto begin = static_cast<int>(part.data() - order.data());
     const auto end = begin + static_cast<int>(part.size());
@@ -76,11 +77,11 @@ class Dissection {
 
   const std::vector<Vec3>& points_;
   const Eigen::SparseMatrix<double>& pattern_;
-  std::vector<int> side_;  // the last half that each unknown was in
+  std::vector<int> side_;  // mark of the half that last contained each unknown
   int mark_ = 0;
 };
 
-// What a frontal matrix leaves to those above it: the lower triangle of a matrix on its border.
+// The update of a frontal matrix to its ancestors: the lower triangle of a matrix on its border.
 struct Update {
   std::vector<int> border;
   Eigen::MatrixXd matrix;
@@ -106,7 +107,7 @@ class Elimination {
       children.push_back(std::move(updates_.back()));
       updates_.pop_back();
     }
-    MeshSolver::FrontalMatrix frontal{node.begin, node.end, BorderOf(node, children), {}, {}};
+    MeshSolver::FrontalMatrix frontal{node.begin, node.end, FindBorder(node, children), {}, {}};
     Eigen::MatrixXd full = Assembled(frontal, children);
     const Eigen::Index own = node.end - node.begin;
     const auto border = static_cast<Eigen::Index>(frontal.border.size());
@@ -116,7 +117,7 @@ class Elimination {
     if (own > 0) {
       Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> in_place(frontal.own);
     }
-    if (own > 0 && border > 0) {  // Eigen's products do not take empty matrices
+    if (own > 0 && border > 0) {  // Eigen's products reject empty matrices
       frontal.own.triangularView<Eigen::Lower>().transpose().solveInPlace<Eigen::OnTheRight>(
           frontal.below);
       update.matrix.selfadjointView<Eigen::Lower>().rankUpdate(frontal.below, -1);
@@ -125,8 +126,8 @@ class Elimination {
     frontals_.push_back(std::move(frontal));
   }
 
-  // The later unknowns that a frontal matrix's own ones are coupled with, by the matrix or by fill.
-  std::vector<int> BorderOf(const Dissection::Node& node, const std::vector<Update>& children) {
+  // The later unknowns that are coupled with a node's own unknowns by the matrix or by fill-in.
+  std::vector<int> FindBorder(const Dissection::Node& node, const std::vector<Update>& children) {
     std::vector<int> border;
     for (int k = node.begin; k < node.end; ++k) {
       for (Eigen::SparseMatrix<double>::InnerIterator it(matrix_, order_[k]); it; ++it) {
@@ -144,7 +145,7 @@ class Elimination {
     return border;
   }
 
-  // The lower triangle over own and border unknowns, in their order.
+  // Assembles the lower triangle over own and border unknowns.
   Eigen::MatrixXd Assembled(const MeshSolver::FrontalMatrix& frontal,
                             const std::vector<Update>& children) {
     const int own = frontal.end - frontal.begin;
@@ -180,16 +181,17 @@ class Elimination {
 
   const std::vector<int>& order_;
   const Eigen::SparseMatrix<double>& matrix_;
-  std::vector<int> rank_;   // of each unknown in the order
-  std::vector<int> local_;  // of each rank in the current frontal matrix
+  std::vector<int> rank_;   // position of each unknown in the order
+  std::vector<int> local_;  // index of each rank in the current frontal matrix
   std::vector<Update> updates_;
   std::vector<MeshSolver::FrontalMatrix> frontals_;
 };
 
-// Blocks of the inverse over each frontal matrix's own unknowns and its border, from the last
-// matrix to the first. Let L be the factor's own part, B that below it, Z the inverse; on the
-// border Z is known from the matrix that owns the first of the border. With Y = B L^-1, Z between
-// border and own is -Z Y, and that of the own is (L L')^-1 + Y' Z Y.
+// Computes blocks of the inverse over each frontal matrix's own and border unknowns, from the last
+// frontal matrix to the first. Let L be the diagonal block of the factor, B the block below it, and
+// Z the inverse on the border, which is known from the frontal matrix that owns the first border
+// unknown. With Y = B L^-1 the inverse between border and own unknowns is -Z Y, and between own
+// unknowns (L L')^-1 + Y' Z Y.
 class BlockInverse {
  public:
   BlockInverse(const std::vector<MeshSolver::FrontalMatrix>& frontals,
@@ -243,7 +245,7 @@ class BlockInverse {
     }
   }
 
-  // Of the owner's block, which is given up with its last child.
+  // The inverse on the border, from the owner's block. The block is freed after its last child.
   Eigen::MatrixXd OnBorder(const MeshSolver::FrontalMatrix& frontal) {
     const int owner = owner_[frontal.border.front()];
     std::vector<int> local;
@@ -282,9 +284,9 @@ class BlockInverse {
   const std::vector<MeshSolver::FrontalMatrix>& frontals_;
   const std::vector<int>& order_;
   Eigen::SparseMatrix<double>& entries_;
-  std::vector<int> rank_;           // of each unknown in the order
-  std::vector<int> owner_;          // the frontal matrix of each rank
-  std::vector<int> open_children_;  // of each of them: those that still need its block
+  std::vector<int> rank_;           // position of each unknown in the order
+  std::vector<int> owner_;          // frontal matrix of each rank
+  std::vector<int> open_children_;  // per frontal matrix, children that still need its block
   std::vector<Eigen::MatrixXd> blocks_;
 };
 
@@ -301,7 +303,7 @@ Eigen::MatrixXd MeshSolver::Solve(const Eigen::MatrixXd& right) const {
   for (const FrontalMatrix& frontal : frontals_) {
     auto own = x.middleRows(frontal.begin, frontal.end - frontal.begin);
     if ((own.array() == 0).all()) {
-      continue;  // right sides of few entries touch few of them
+      continue;  // sparse right sides involve few frontal matrices
     }
     frontal.own.triangularView<Eigen::Lower>().solveInPlace(own);
     if (!frontal.border.empty()) {

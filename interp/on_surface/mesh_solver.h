@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Direct solution of the symmetric equations of a mesh, for many right sides.
+// Solves symmetric positive definite equations on a mesh directly, for many right sides.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,29 +10,30 @@
 
 namespace semblance {
 
-// Multifrontal Cholesky: nested dissection leaves small dense matrices, whose products are several
-// times as fast as a sparse factorisation by columns.
+// A multifrontal Cholesky factorisation. Nested dissection leaves small dense matrices, whose
+// products are several times as fast as a sparse factorisation by columns.
 class MeshSolver {
  public:
-  // matrix: positive definite, both triangles. points: one per unknown, where it lies; they give an
-  // elimination order, no result but for rounding.
+  // matrix: positive definite, with both triangles. points: the place of each unknown, which
+  // determines only the order of elimination.
   MeshSolver(const std::vector<Vec3>& points, const Eigen::SparseMatrix<double>& matrix);
 
-  // One solution per column; several at once cost less than one by one.
+  // Solves for each column of `right`. Several columns at once cost less than single ones.
   Eigen::MatrixXd Solve(const Eigen::MatrixXd& right) const;
 
-  // The inverse's entries where `entries` has some, whatever their values: both triangles, and only
-  // where the matrix has an entry (or its factor; so vertices and edges of the mesh). By Takahashi,
-  // Fagan & Chin (1973), matrix by matrix; costs about twice the factorisation.
+  // Computes the entries of the inverse at the nonzeros of `entries` (both triangles), which must
+  // be nonzeros of the matrix or its factor, such as vertices and edges of the mesh. The method of
+  // Takahashi, Fagan & Chin (1973), applied to the frontal matrices, costs about twice the
+  // factorisation.
   Eigen::SparseMatrix<double> SelectedInverse(Eigen::SparseMatrix<double> entries) const;
 
-  // Unknowns that are eliminated together: those at begin..end-1 in the order, coupled with later
-  // ones, the border.
+  // Unknowns that are eliminated together: the positions begin .. end - 1 of the order. The border
+  // consists of the later unknowns that are coupled with them.
   struct FrontalMatrix {
     int begin = 0, end = 0;
     std::vector<int> border;
-    Eigen::MatrixXd own;    // lower triangle of the Cholesky factor
-    Eigen::MatrixXd below;  // its rows at the border
+    Eigen::MatrixXd own;    // lower triangle of the Cholesky factor's diagonal block
+    Eigen::MatrixXd below;  // the factor's rows at the border
   };
 
  private:

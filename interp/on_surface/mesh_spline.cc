@@ -14,13 +14,14 @@
 namespace semblance {
 namespace {
 
-constexpr double kLeastSoftness = 1e-12;  // two dowels closest to one vertex must not be singular
+constexpr double kMinSoftness = 1e-12;  // keeps two dowels at one vertex from making the equations
+                                        // singular
 
-constexpr Eigen::Index kMostHeld = 64;  // functions held at a time: 8 bytes per vertex each
+constexpr Eigen::Index kMaxHeld = 64;  // functions in memory at a time: 8 bytes per vertex each
 constexpr std::size_t kSolvedTogether =
     16;  // right sides solved at a time: 8 bytes per vertex each
 
-// The function's mean that one dowel speaks of: sum of weight times value, weights of sum 1.
+// The local mean that a dowel prescribes: sum of weight * value, with weights of sum 1.
 struct LocalMean {
   std::vector<std::pair<int, double>> weights;
   int piece = 0;
@@ -52,18 +53,18 @@ LocalMean LocalMeanAt(const Vec3& base, double radius_mm, const TriMesh& skull,
   return mean;
 }
 
-// Let b_i be the local means as vectors of weights, G the inverse of the energy's matrix on
-// functions of mean 0, piece by piece. The least energy with means d + residuals is u = sum_i l_i G
-// b_i + a constant a piece, where the l_i of a piece sum to 0: small equations in S_ij = b_i' G
-// b_j, whatever the skull's size. As the l_i sum to 0, S may have its means taken off, rows and
-// columns, piece by piece.
+// Let b_i be the local means as vectors of weights, and G the inverse of the energy's matrix on
+// functions with mean 0 on each piece of the skull. The function of least energy is u = sum_i l_i G
+// b_i + one constant per piece, where the l_i of a piece sum to 0. This leaves small equations in
+// S_ij = b_i' G b_j, independent of the skull's size. Since the l_i of a piece sum to 0, the row
+// and column means of S per piece may be subtracted.
 class Spline {
  public:
   Spline(const MeshSpline& options, const TriMesh& skull, const std::vector<DepthSample>& samples,
          const RunContext& run)
       : options_(options),
         laplacian_(BuildLaplacian(skull)),
-        pieces_(LabelComponents(laplacian_.stiffness)),
+        pieces_(LabelPieces(laplacian_.stiffness)),
         solver_(skull.points, Grounded()) {
     run.ThrowIfStopped();
     piece_area_.resize(1 + *std::ranges::max_element(pieces_), 0);
@@ -80,9 +81,10 @@ class Spline {
   std::vector<double> Solve(const std::vector<DepthSample>& samples, const RunContext& run) const {
     std::vector<Eigen::Index> all(means_.size());
     std::iota(all.begin(), all.end(), 0);
-    const Pulls pulls = PullsOf(Kernel(run), samples, all);
+    const Pulls pulls = SolvePulls(Kernel(run), samples, all);
     const Eigen::VectorXd varying = Varying(Combined(pulls.pull));
-    const Eigen::VectorXd constants = MeanByPiece(pulls.met - LocalMeansOf(varying), PiecesOf(all));
+    const Eigen::VectorXd constants =
+        MeanByPiece(pulls.met - EvaluateMeans(varying), PiecesAt(all));
     std::vector<double> values(pieces_.size());
     for (std::size_t i = 0; i < values.size(); ++i) {
       values[i] = constants[pieces_[i]] + varying[static_cast<Eigen::Index>(i)];
@@ -90,7 +92,8 @@ class Spline {
     return values;
   }
 
-  // The local means of the function that is not shown these samples. kernel: S of all.
+  // The local means at the samples of `fold`, of the function without these samples. kernel: S of
+  // all samples.
   std::vector<double> ValuesWithout(const std::vector<std::size_t>& fold,
                                     const std::vector<DepthSample>& samples,
                                     const Eigen::MatrixXd& kernel) const {
@@ -101,9 +104,9 @@ class Spline {
       }
     }
     const Eigen::MatrixXd between = kernel(shown, shown);
-    const Pulls pulls = PullsOf(between, samples, shown);
+    const Pulls pulls = SolvePulls(between, samples, shown);
     const Eigen::VectorXd constants =
-        MeanByPiece(pulls.met - between * pulls.pull, PiecesOf(shown));
+        MeanByPiece(pulls.met - between * pulls.pull, PiecesAt(shown));
     std::vector<double> values;
     for (const std::size_t i : fold) {
       const Eigen::RowVectorXd to_shown = kernel(static_cast<Eigen::Index>(i), shown);
@@ -112,10 +115,10 @@ class Spline {
     return values;
   }
 
-  // S, but for what centring takes off.
+  // S before centring.
   Eigen::MatrixXd Kernel(const RunContext& run) const {
     const Eigen::Index n = Size();
-    const bool inner_product = options_.energy == SplineEnergy::kLaplacian && n <= kMostHeld;
+    const bool inner_product = options_.energy == SplineEnergy::kLaplacian && n <= kMaxHeld;
     Eigen::MatrixXd held(inner_product ? laplacian_.area_mm2.size() : 0, n), kernel(n, n);
     const std::size_t blocks = (means_.size() + kSolvedTogether - 1) / kSolvedTogether;
     ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
@@ -127,30 +130,30 @@ class Spline {
       if (inner_product) {
         held.middleCols(first, count) = HalfVarying(right);
       } else {
-        kernel.middleCols(first, count) = LocalMeansOf(Varying(right));
+        kernel.middleCols(first, count) = EvaluateMeans(Varying(right));
       }
     });
     return inner_product ? Products(held) : kernel;
   }
 
  private:
-  // Of the local means that are shown: the l_i, and the means that the function is to have.
+  // The solution for the shown local means: pull holds the l_i, and met the means of the function.
   struct Pulls {
     Eigen::VectorXd pull, met;
   };
 
-  // between: S of the shown ones.
-  Pulls PullsOf(const Eigen::MatrixXd& between, const std::vector<DepthSample>& samples,
-                const std::vector<Eigen::Index>& shown) const {
+  // between: S of the shown samples.
+  Pulls SolvePulls(const Eigen::MatrixXd& between, const std::vector<DepthSample>& samples,
+                   const std::vector<Eigen::Index>& shown) const {
     const Eigen::Index n = std::ssize(shown);
-    const std::vector<int> pieces = PiecesOf(shown);
+    const std::vector<int> pieces = PiecesAt(shown);
     const Eigen::MatrixXd kernel = Centred(between, pieces);
     const std::vector<int> used = Distinct(pieces);
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + std::ssize(used), n + std::ssize(used));
     Eigen::VectorXd right = Eigen::VectorXd::Zero(matrix.rows());
     matrix.topLeftCorner(n, n) = kernel;
     const double spread = kernel.diagonal().mean(), scale = spread > 0 ? spread : 1;
-    const double softness = std::max(options_.softness, kLeastSoftness) * scale;
+    const double softness = std::max(options_.softness, kMinSoftness) * scale;
     for (Eigen::Index i = 0; i < n; ++i) {
       matrix(i, i) += softness;
       const auto at = std::ranges::find(used, pieces[i]) - used.begin();
@@ -161,7 +164,7 @@ class Spline {
     return {pull, right.head(n) - softness * pull};
   }
 
-  std::vector<int> PiecesOf(const std::vector<Eigen::Index>& shown) const {
+  std::vector<int> PiecesAt(const std::vector<Eigen::Index>& shown) const {
     std::vector<int> pieces;
     for (const Eigen::Index k : shown) {
       pieces.push_back(means_[k].piece);
@@ -177,7 +180,7 @@ class Spline {
 
   Eigen::Index Size() const { return static_cast<Eigen::Index>(means_.size()); }
 
-  // The stiffness with one vertex per piece held, which changes no solution but for a constant.
+  // The stiffness with one vertex per piece fixed, which changes a solution only by a constant.
   Eigen::SparseMatrix<double> Grounded() const {
     Eigen::SparseMatrix<double> matrix = laplacian_.stiffness;
     std::vector<Eigen::Triplet<double>> held;
@@ -192,7 +195,8 @@ class Spline {
     return matrix + ground;
   }
 
-  // On each piece, from each column: `share` times its sum over all of the piece.
+  // Subtracts from each column, per piece, share / area times the column's sum weighted by
+  // `summed`.
   void TakeShares(Eigen::MatrixXd& columns, const Eigen::VectorXd& summed,
                   const Eigen::VectorXd& share) const {
     Eigen::MatrixXd sums =
@@ -207,7 +211,7 @@ class Spline {
     }
   }
 
-  // One column per column of weights of the local means.
+  // Combines the local means' weight vectors: one column per column of `of_mean`.
   Eigen::MatrixXd Combined(const Eigen::MatrixXd& of_mean) const {
     Eigen::MatrixXd right =
         Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(pieces_.size()), of_mean.cols());
@@ -219,8 +223,8 @@ class Spline {
     return right;
   }
 
-  // G times right sides; of mean 0 on each piece. Where a right side's sum on a piece is not 0,
-  // what holds its vertex answers: the same for all local means there, so nothing where the l_i sum
+  // G times right sides, with mean 0 on each piece. If a right side's sum on a piece is not 0, the
+  // fixed vertex adds the same to all local means of the piece, which cancels because the l_i sum
   // to 0.
   Eigen::MatrixXd Varying(const Eigen::MatrixXd& right) const {
     const Eigen::MatrixXd values = HalfVarying(right);
@@ -229,7 +233,7 @@ class Spline {
                : values;
   }
 
-  // The same with the stiffness's inverse for G.
+  // The same with the inverse of the stiffness for G.
   Eigen::MatrixXd HalfVarying(const Eigen::MatrixXd& right) const {
     const Eigen::VectorXd& area = laplacian_.area_mm2;
     Eigen::MatrixXd values = solver_.Solve(right);
@@ -237,8 +241,8 @@ class Spline {
     return values;
   }
 
-  // The local means of functions, one function per column.
-  Eigen::MatrixXd LocalMeansOf(const Eigen::MatrixXd& values) const {
+  // The local means of functions, given as columns.
+  Eigen::MatrixXd EvaluateMeans(const Eigen::MatrixXd& values) const {
     Eigen::MatrixXd at = Eigen::MatrixXd::Zero(Size(), values.cols());
     for (Eigen::Index k = 0; k < Size(); ++k) {
       for (const auto& [vertex, weight] : means_[k].weights) {
@@ -248,8 +252,8 @@ class Spline {
     return at;
   }
 
-  // Over the local means of each piece, of one value per local mean, whose pieces are given; NaN on
-  // pieces without any.
+  // The mean per piece of one value per local mean; NaN on pieces without local means. piece: the
+  // piece of each local mean.
   Eigen::VectorXd MeanByPiece(const Eigen::VectorXd& of_mean, const std::vector<int>& piece) const {
     const auto count = static_cast<Eigen::Index>(piece_area_.size());
     Eigen::VectorXd sum = Eigen::VectorXd::Zero(count), members = sum;
@@ -260,7 +264,7 @@ class Spline {
     return sum.cwiseQuotient(members);
   }
 
-  // S without the means, piece by piece, of its columns and then of its rows.
+  // Subtracts the means per piece of the columns and then of the rows.
   Eigen::MatrixXd Centred(Eigen::MatrixXd matrix, const std::vector<int>& piece) const {
     for (int side = 0; side < 2; ++side) {
       for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
@@ -274,7 +278,8 @@ class Spline {
     return matrix;
   }
 
-  // Twice the Laplacian makes an inner product of half-way functions: half of the solves.
+  // With the Laplacian energy, S is an inner product of half-way functions, which saves half of the
+  // solves.
   Eigen::MatrixXd Products(const Eigen::MatrixXd& half_way) const {
     return half_way.transpose() * laplacian_.area_mm2.asDiagonal() * half_way;
   }
@@ -311,7 +316,7 @@ std::vector<DepthField> MeshSplineLeftOut(const MeshSpline& spline, std::string_
   std::vector<DepthField> fields;
   for (const std::vector<std::size_t>& fold : folds) {
     run.ThrowIfStopped();
-    const ShownDowels shown = Without(input, fold);
+    const ShownDowels shown = LeaveOutDowels(input.dowels, input.network, fold);
     const std::vector<DepthSample> shown_samples = DepthSamples(shown.dowels);
     TriMesh bases;
     std::vector<Vec3> directions;

@@ -12,11 +12,12 @@
 namespace semblance {
 namespace {
 
-constexpr std::size_t kHeldTogether = 8;  // distances held at a time: 8 bytes per vertex each
+constexpr std::size_t kHeldTogether = 8;  // samples in memory at a time: 8 bytes per vertex each
 constexpr double kFar = std::numeric_limits<double>::infinity();
 
-// The distance at c of a wave that reached a and b from one source: a, b and c in a plane, the
-// source on the other side of ab. Infinite where the straight way does not pass between a and b.
+// The distance at c of a wave that reached a and b from one source. The triangle is unfolded into a
+// plane with the source on the other side of ab. Infinite if the straight path does not pass
+// between a and b.
 double ThroughEdge(const Vec3& a, double at_a, const Vec3& b, double at_b, const Vec3& c) {
   const double edge2 = (b - a).squaredNorm();
   if (edge2 == 0) {
@@ -48,7 +49,7 @@ class FastMarching {
     }
   }
 
-  // The next vertex in order of distance; -1 at the end.
+  // Returns the next vertex in order of distance, or -1 at the end.
   int Pass() {
     while (!open_.empty()) {
       const int vertex = open_.top().second;
@@ -61,7 +62,7 @@ class FastMarching {
     return -1;
   }
 
-  // What `vertex`, just passed, tells the others of one of its triangles.
+  // Updates the other vertices of a triangle from `vertex`, which was just passed.
   void Spread(int vertex, const Triangle& t) {
     for (const int to : t) {
       if (passed_[to]) {
@@ -91,23 +92,7 @@ class FastMarching {
 }  // namespace
 
 SurfaceDistance::SurfaceDistance(const TriMesh& mesh)
-    : mesh_(mesh), query_(mesh), first_at_(mesh.points.size() + 1, 0) {
-  for (const Triangle& t : mesh.triangles) {
-    for (const int v : t) {
-      ++first_at_[v + 1];
-    }
-  }
-  for (std::size_t v = 0; v < mesh.points.size(); ++v) {
-    first_at_[v + 1] += first_at_[v];
-  }
-  std::vector<int> next = first_at_;
-  triangles_at_.resize(3 * mesh.triangles.size());
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    for (const int v : mesh.triangles[t]) {
-      triangles_at_[next[v]++] = static_cast<int>(t);
-    }
-  }
-}
+    : mesh_(mesh), query_(mesh), triangles_at_(mesh) {}
 
 std::vector<double> SurfaceDistance::From(const Vec3& p) const {
   const MeshPoint source = query_.Closest(p);
@@ -116,7 +101,7 @@ std::vector<double> SurfaceDistance::From(const Vec3& p) const {
     march.Offer(v, (mesh_.points[v] - source.position).norm());
   }
   for (int v = march.Pass(); v >= 0; v = march.Pass()) {
-    for (const int t : TrianglesAt(v)) {
+    for (const int t : triangles_at_.At(v)) {
       march.Spread(v, mesh_.triangles[t]);
     }
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Distances along the skull's surface.
+// Geodesic distances along the skull's surface.
 #pragma once
 
 #include <array>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "interp/dowels/dowel_samples.h"
+#include "interp/on_surface/coarse_surface.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -18,43 +19,39 @@ constexpr auto EnumNames(DowelDistance) {
   return std::to_array<std::string_view>({"euclidean", "geodesic"});
 }
 
-// The option behind it: alike for all schemes that have it.
+// The common option of all schemes with a choice of distance.
 template <class Visitor>
 void DistanceField(Visitor& visit, DowelDistance& distance) {
   visit(FieldInfo{.name = "distance",
-                  .doc = "between dowels and vertices: euclidean, a straight line, or geodesic, "
-                         "along the bone, by which a dowel does not reach through it or across a "
-                         "gap; pieces of the skull that are closest to no dowel get no depth then; "
+                  .doc = "distance between dowels and vertices: euclidean (straight), or geodesic "
+                         "(along the bone), so that a dowel has no effect through the bone or "
+                         "across a gap; pieces of the skull without a dowel then get no depth; "
                          "some 0.3 s per dowel on a skull of 400k vertices"},
         distance);
 }
 
-// Fast marching with waves that are spherical in each triangle: exact on a plane where the
-// way passes between the two corners it comes from; else off by some tenths of an edge near the
-// source and by up to 2 % far away. Takes any triangles: open, of several pieces, non-manifold,
-// slivers.
+// Fast marching with waves that are spherical within each triangle. It is exact on a plane if the
+// path passes between the two corners from which it comes; otherwise it errs by some tenths of an
+// edge near the source and by up to 2 % far away. It accepts any triangles: open, in several
+// pieces, non-manifold, slivers.
 class SurfaceDistance {
  public:
-  // Throws InputError as MeshQuery. The mesh must outlive this.
+  // Throws InputError as MeshQuery does. The mesh must outlive this object.
   explicit SurfaceDistance(const TriMesh& mesh);
 
-  // mm, from the point of the surface closest to p, one per vertex; infinite on other pieces.
+  // The distance, in mm, from the surface's point closest to p to each vertex; infinite on other
+  // pieces.
   std::vector<double> From(const Vec3& p) const;
 
  private:
-  std::span<const int> TrianglesAt(int vertex) const {
-    return {triangles_at_.data() + first_at_[vertex],
-            static_cast<std::size_t>(first_at_[vertex + 1] - first_at_[vertex])};
-  }
-
   const TriMesh& mesh_;
   MeshQuery query_;
-  std::vector<int> first_at_, triangles_at_;  // the triangles of each vertex
+  VertexTriangles triangles_at_;
 };
 
-// use(k, distances of sample k), in order, from one thread; the distances are found on run.threads
-// threads, a few samples at a time. Throws InputError, naming the scheme, if the skull has no
-// triangle; Cancelled if stopped.
+// Calls use(k, distances of sample k) in order, from one thread. The distances are computed on
+// run.threads threads, a few samples at a time. Throws InputError, with the scheme's name, if the
+// skull has no triangle; Cancelled if stopped.
 void ForEachGeodesic(std::string_view scheme, const TriMesh& skull,
                      const std::vector<DepthSample>& samples, const RunContext& run,
                      const std::function<void(std::size_t, const std::vector<double>&)>& use);

@@ -17,7 +17,7 @@
 namespace semblance {
 namespace {
 
-// NaN where the cell is empty.
+// Reads a column; an empty cell gives NaN.
 std::vector<double> CsvColumn(const std::string& text, const std::string& name,
                               const std::string& where) {
   CsvReader csv(text, where);
@@ -29,7 +29,7 @@ std::vector<double> CsvColumn(const std::string& text, const std::string& name,
   return values;
 }
 
-// The map: a mesh and a depth at each of its vertices.
+// A mesh and a depth at each of its vertices.
 struct MappedDepth {
   TriMesh mesh;
   std::vector<double> depth_mm;
@@ -76,13 +76,13 @@ void CheckMap(const MappedDepth& map, const DepthMap& options) {
   }
 }
 
-// NaN where a corner that counts has none.
+// The depth at a point; NaN if a corner with a weight has none.
 double DepthOn(const MappedDepth& map, const MeshPoint& at) {
-  constexpr double kNothing = 1e-9;
+  constexpr double kMinWeight = 1e-9;
   const Triangle& t = map.mesh.triangles[at.triangle];
   double depth = 0;
   for (int k = 0; k < 3; ++k) {
-    depth += at.weights[k] > kNothing ? at.weights[k] * map.depth_mm[t[k]] : 0;
+    depth += at.weights[k] > kMinWeight ? at.weights[k] * map.depth_mm[t[k]] : 0;
   }
   return depth;
 }

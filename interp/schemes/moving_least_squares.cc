@@ -9,9 +9,10 @@
 namespace semblance {
 namespace {
 
-constexpr double kLeastLog = -40;  // of a weight over the nearest dowel's; below, it has no effect
+constexpr double kMinLogWeight = -40;  // log of weight over the nearest dowel's; smaller weights
+                                       // have no effect
 
-// Of weighted samples around p; positions relative to p, so that the value at p is the value at 0.
+// Moments of the weighted samples, with positions relative to p, so that p is the origin.
 struct Moments {
   double weight = 0;
   Vec3 position = Vec3::Zero();
@@ -36,9 +37,9 @@ Moments MomentsAround(const std::vector<DepthSample>& samples, double width_mm, 
   Moments moments;
   for (const DepthSample& sample : samples) {
     const Vec3 x = sample.base - p;
-    // Relative to the nearest one: far from all dowels the weights would vanish.
+    // Relative to the nearest dowel's weight, because far from all dowels the weights would vanish.
     const double log = (nearest2 - x.squaredNorm()) / (width_mm * width_mm);
-    if (log > kLeastLog) {
+    if (log > kMinLogWeight) {
       moments.Add(std::exp(log), x, sample.depth_mm);
     }
   }

@@ -11,9 +11,9 @@
 namespace semblance {
 namespace {
 
-constexpr double kReach = 4;  // times the furthest dowel's distance
+constexpr double kReach = 4;  // times the furthest dowel's distance; larger cells count as open
 
-// Of each dowel, all dowels with their distances: the nearest hundred in order, then the rest.
+// For each dowel, all dowels with their distances: the nearest hundred sorted, then the rest.
 class Neighbourhoods {
  public:
   struct Other {
@@ -22,7 +22,7 @@ class Neighbourhoods {
   };
 
   explicit Neighbourhoods(const std::vector<DepthSample>& samples) : others_(samples.size()) {
-    constexpr std::size_t kInOrder = 100;  // few points have neighbours further down
+    constexpr std::size_t kInOrder = 100;  // few points have neighbours beyond these
     for (std::size_t k = 0; k < samples.size(); ++k) {
       for (std::size_t other = 0; other < samples.size(); ++other) {
         others_[k].push_back(
@@ -32,19 +32,19 @@ class Neighbourhoods {
       std::ranges::partial_sort(others_[k], middle, {}, &Other::distance_mm);
     }
   }
-  const std::vector<Other>& Of(int sample) const { return others_[sample]; }
+  const std::vector<Other>& Around(int sample) const { return others_[sample]; }
 
  private:
   std::vector<std::vector<Other>> others_;
 };
 
-// The nearest dowel of a point, and how far it and the furthest are.
+// The nearest dowel of a point, and the distances of the nearest and the furthest dowel.
 struct Range {
   int nearest = -1;
   double nearest_mm = kNaN, furthest_mm = kNaN;
 };
 
-Range RangeOf(const std::vector<DepthSample>& samples, const Vec3& p) {
+Range FindRange(const std::vector<DepthSample>& samples, const Vec3& p) {
   double least2 = std::numeric_limits<double>::infinity(), most2 = 0;
   Range range;
   for (std::size_t k = 0; k < samples.size(); ++k) {
@@ -60,8 +60,8 @@ Range RangeOf(const std::vector<DepthSample>& samples, const Vec3& p) {
   return range;
 }
 
-// The tangent plane at p. The first axis points to the nearest dowel, so that the reach turns with
-// the skull.
+// The tangent plane at p. The first axis points to the nearest dowel, so that the result does not
+// depend on the skull's orientation.
 struct TangentPlane {
   Vec3 at, first, second;
 
@@ -71,31 +71,32 @@ struct TangentPlane {
     first = first.norm() > kSamePoint_mm ? first.normalized() : normal.unitOrthogonal();
     second = normal.cross(first);
   }
-  PowerSite SiteOf(const Vec3& base) const {
+  PowerSite MakeSite(const Vec3& base) const {
     const Vec3 x = base - at;
     return {{x.dot(first), x.dot(second)}, x.squaredNorm()};
   }
 };
 
-// A point's cell, and the dowels that may have a part in it.
+// A point's cell, and the dowels that may lose a part to it.
 struct NeighbourCell {
   explicit NeighbourCell(double reach) : shape(reach) {}
 
   PowerCell shape;
   boost::container::small_vector<PowerSite, 48> sites;
-  boost::container::small_vector<int, 48> samples;  // each site's
+  boost::container::small_vector<int, 48> samples;  // sample of each site
 };
 
-// A dowel whose distance from the nearest one is more than twice that of any point of the cell does
-// not matter: the nearest one is nearer to all of the cell. And no point of the cell is further
-// from the nearest dowel than the cell's furthest corner is from p, plus p from that dowel.
+// Cuts the cell by the dowels. A dowel is irrelevant if its distance from the nearest dowel is more
+// than twice the distance of any point of the cell from the nearest dowel, because then the nearest
+// dowel is closer to the whole cell. The latter distance is at most the cell's furthest corner from
+// p plus p's distance from the nearest dowel.
 void CutCell(const std::vector<DepthSample>& samples, const Neighbourhoods& neighbourhoods,
              const Range& range, const TangentPlane& plane, NeighbourCell& cell) {
   constexpr double kSlack = 1 + 1e-9;
-  for (const Neighbourhoods::Other& other : neighbourhoods.Of(range.nearest)) {
+  for (const Neighbourhoods::Other& other : neighbourhoods.Around(range.nearest)) {
     const double corner_mm = std::sqrt(cell.shape.FurthestCorner2());
     if (other.distance_mm <= 2 * kSlack * (corner_mm + range.nearest_mm)) {
-      const PowerSite site = plane.SiteOf(samples[other.sample].base);
+      const PowerSite site = plane.MakeSite(samples[other.sample].base);
       cell.shape.Cut(site, static_cast<int>(cell.sites.size()));
       cell.sites.push_back(site);
       cell.samples.push_back(other.sample);
@@ -103,7 +104,7 @@ void CutCell(const std::vector<DepthSample>& samples, const Neighbourhoods& neig
   }
 }
 
-// use(site, weight) for each that has one.
+// Calls use(site, weight) for each site with a weight.
 template <class Use>
 void ForEachWeight(NeighbourWeights kind, const NeighbourCell& cell, const Use& use) {
   const CellPolygon& corners = cell.shape.polygon();
@@ -126,13 +127,13 @@ void ForEachWeight(NeighbourWeights kind, const NeighbourCell& cell, const Use& 
 
 DepthValue DepthAt(const std::vector<DepthSample>& samples, const Neighbourhoods& neighbourhoods,
                    NeighbourWeights kind, const Vec3& p, const Vec3& normal) {
-  const Range range = RangeOf(samples, p);
+  const Range range = FindRange(samples, p);
   const DepthSample& nearest = samples[range.nearest];
   if (range.nearest_mm <= kSamePoint_mm) {
     return {nearest.depth_mm, nearest.sd_mm};
   }
   if (normal.squaredNorm() == 0) {
-    return {};  // no tangent plane
+    return {};  // no normal, hence no tangent plane
   }
   NeighbourCell cell(kReach * range.furthest_mm);
   CutCell(samples, neighbourhoods, range, TangentPlane(p, normal, nearest.base), cell);
@@ -161,7 +162,7 @@ DepthField InterpolateDepth(const NaturalNeighbour& options, const DepthInput& i
   return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
     const DepthValue value =
         DepthAt(samples, neighbourhoods, options.weights, input.skull.points[i], input.normals[i]);
-    return DepthValue{limits(value.mm), value.sd_mm};  // against rounding
+    return DepthValue{limits(value.mm), value.sd_mm};  // against round-off
   });
 }
 

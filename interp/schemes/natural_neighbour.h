@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Natural neighbours: the dowels whose cells a vertex would take from, were it a dowel itself.
+// Natural neighbour interpolation: the neighbours of a vertex are the dowels whose Voronoi cells
+// would lose area if the vertex were a dowel.
 #pragma once
 
 #include <array>
@@ -16,27 +17,27 @@ constexpr auto EnumNames(NeighbourWeights) {
 
 struct NaturalNeighbour {
   static constexpr std::string_view kName = "natural_neighbour";
-  NeighbourWeights weights = NeighbourWeights::kSibson;  // laplace is cheaper, but creased
-  double max_angle_deg = 90;                             // further turned bone gets no depth
+  NeighbourWeights weights = NeighbourWeights::kSibson;
+  double max_angle_deg = 90;
 };
 template <class Visitor>
 void Fields(Visitor& visit, NaturalNeighbour& o) {
   visit(FieldInfo{.name = "weights",
-                  .doc = "of a dowel: sibson, the area its cell would lose to the vertex (smooth "
-                         "but at the dowels), or laplace, the common border over the distance "
-                         "(with creases, cheaper)"},
+                  .doc = "weight of a dowel: sibson, the area that its cell would lose to the "
+                         "vertex (smooth except at the dowels), or laplace, the common border over "
+                         "the distance (with creases, cheaper)"},
         o.weights);
   MaxAngleField(visit, o.max_angle_deg);
 }
 
 // The cells are those of the dowels' Voronoi diagram in space, cut by the vertex's tangent plane
-// (Boissonnat and Flototto 2002). A depth linear on a plane is reproduced there; always within the
-// dowels' range; a dowel has no effect beyond its neighbours. sd_mm is averaged alike, as if the
-// dowels deviated together; NaN if one of the neighbours has none.
+// (Boissonnat and Flototto 2002). A linear depth on a plane is reproduced. The depth is always
+// within the dowels' range, and a dowel affects only its neighbourhood. sd_mm is averaged with the
+// same weights, which assumes fully correlated errors; NaN if a neighbour has none.
 //
-// kOutside where the vertex's own cell would be open, or reach beyond four times the furthest
-// dowel's distance: outside the dowels' hull. kNotFacing as AssignWhereFacing. Throws InputError as
-// CheckDepthInput.
+// kOutside if the vertex's own cell is open or extends beyond four times the distance of the
+// furthest dowel, which happens outside the dowels' hull. kNotFacing as in AssignWhereFacing.
+// Throws InputError as CheckDepthInput does.
 DepthField InterpolateDepth(const NaturalNeighbour& options, const DepthInput& input,
                             const RunContext& run);
 

@@ -6,8 +6,9 @@
 #include <algorithm>
 #include <limits>
 
-#include "interp/schemes/mean.h"
+#include "interp/schemes/simple_schemes.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/geometry.h"
 #include "surfaces/mesh/point_triangle.h"
 
 namespace semblance {
@@ -31,7 +32,7 @@ Depth SiteDepth(const std::string& site, std::span<const Dowel> dowels, const Ru
   return {mean, kNaN};
 }
 
-// A triangle of the network with a sphere around it, which spares most of the closest points.
+// A triangle of the network with a sphere around it, which avoids most closest-point computations.
 struct NetworkTriangle {
   std::array<Vec3, 3> base;
   Vec3 depth_mm;
@@ -40,7 +41,7 @@ struct NetworkTriangle {
   double radius_mm = 0;
 };
 
-std::vector<NetworkTriangle> TrianglesOf(const DepthInput& input) {
+std::vector<NetworkTriangle> MakeTriangles(const DepthInput& input) {
   std::vector<NetworkTriangle> triangles;
   for (const std::array<int, 3>& area : input.network.areas) {
     NetworkTriangle triangle;
@@ -81,24 +82,21 @@ NetworkPoint ClosestOnNetwork(const std::vector<NetworkTriangle>& triangles, con
   return closest;
 }
 
-// 0 up to `from`, 1 from `from + length` on, with a continuous slope between.
-double SmoothStep(double x, double from, double length) {
-  if (x <= from || x >= from + length) {
-    return x <= from ? 0 : 1;
-  }
-  const double t = (x - from) / length;
-  return t * t * (3 - 2 * t);
+// Share of the far depth at a distance from the network.
+double FarShare(double distance_mm, double tissue_mm, double blend_mm) {
+  const double beyond_mm = distance_mm - tissue_mm;
+  return blend_mm > 0 ? SmoothStep(beyond_mm / blend_mm) : beyond_mm > 0 ? 1 : 0;
 }
 
 Depth Mix(const Depth& a, const Depth& b, double share_of_b) {
   if (share_of_b == 0 || share_of_b == 1) {
-    return share_of_b == 0 ? a : b;  // the other one may have no sd
+    return share_of_b == 0 ? a : b;  // the other one may have an sd of NaN
   }
   return {(1 - share_of_b) * a.mm + share_of_b * b.mm,
           (1 - share_of_b) * a.sd_mm + share_of_b * b.sd_mm};
 }
 
-// depth_at(p) for each vertex that the scheme left.
+// Sets depth_at(p) at each vertex without a depth from the scheme.
 void Fill(const DepthInput& input, const RunContext& run, DepthField& field,
           const std::function<Depth(const Vec3&)>& depth_at) {
   ForEachVertex(input, run, [&](std::size_t i) {
@@ -113,11 +111,11 @@ void Fill(const DepthInput& input, const RunContext& run, DepthField& field,
 void Apply(const ExtendNetwork& rule, const DepthInput& input, const RunContext& run,
            DepthField& field) {
   const Depth far = SiteDepth(rule.site, input.dowels, run);
-  const std::vector<NetworkTriangle> triangles = TrianglesOf(input);
+  const std::vector<NetworkTriangle> triangles = MakeTriangles(input);
   const double tissue_mm = MeanDepth(input.dowels);
   Fill(input, run, field, [&](const Vec3& p) {
     const NetworkPoint near = ClosestOnNetwork(triangles, p);
-    return Mix(near.depth, far, SmoothStep(near.distance_mm, tissue_mm, rule.blend_mm));
+    return Mix(near.depth, far, FarShare(near.distance_mm, tissue_mm, rule.blend_mm));
   });
 }
 

@@ -16,8 +16,8 @@ const CellCorner& Next(const CellPolygon& polygon, std::size_t i) {
   return polygon[i + 1 < polygon.size() ? i + 1 : 0];
 }
 
-// What of the polygon has value(x) >= 0, for a linear value. Most have it everywhere: then false,
-// and `clipped` is left alone.
+// Clips the polygon to value(x) >= 0 for a linear value. Returns false, without setting `clipped`,
+// if the whole polygon remains, which is the usual case.
 template <class Value>
 bool Clip(const CellPolygon& polygon, const Value& value, int edge, CellPolygon& clipped) {
   boost::container::small_vector<double, 24> at(polygon.size(), boost::container::default_init);
@@ -44,7 +44,7 @@ bool Clip(const CellPolygon& polygon, const Value& value, int edge, CellPolygon&
   return true;
 }
 
-double TwiceAreaOf(const CellPolygon& polygon) {
+double TwiceArea(const CellPolygon& polygon) {
   double twice = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     twice += Cross(polygon[i].at, Next(polygon, i).at);
@@ -60,10 +60,10 @@ double Furthest2(const CellPolygon& polygon) {
   return furthest2;
 }
 
-// Those that may keep a part of the cell, also such as the point would swallow whole: the lowest of
-// the linear functions is nowhere in the cell above the least of their largest values.
-boost::container::small_vector<int, 48> ContendersFor(std::span<const PowerSite> sites,
-                                                      const CellPolygon& cell) {
+// The sites that may lose a part of the cell. In the cell the lowest of the linear functions is
+// nowhere above the smallest of their maxima, which excludes sites above this bound.
+boost::container::small_vector<int, 48> FindContenders(std::span<const PowerSite> sites,
+                                                       const CellPolygon& cell) {
   boost::container::small_vector<double, 48> least(sites.size(), kInfinity);
   double bound = kInfinity;
   for (std::size_t k = 0; k < sites.size(); ++k) {
@@ -84,14 +84,14 @@ boost::container::small_vector<int, 48> ContendersFor(std::span<const PowerSite>
   return contenders;
 }
 
-// A vertex of the lower envelope of the values: where three sites have the same value, and that
-// value; infinite where they do not meet inwards.
+// A vertex of the lower envelope: the point where three sites' functions are equal, and their value
+// (level); infinite if they do not meet inside.
 struct Vertex {
   Vec2 at = Vec2::Zero();
   double level = kInfinity;
 };
 
-Vertex VertexOf(const PowerSite& a, const PowerSite& b, const PowerSite& c) {
+Vertex EnvelopeVertex(const PowerSite& a, const PowerSite& b, const PowerSite& c) {
   const Vec2 ab = b.position - a.position, bc = c.position - b.position;
   const double across = 2 * Cross(ab, bc);
   if (across == 0) {
@@ -104,17 +104,17 @@ Vertex VertexOf(const PowerSite& a, const PowerSite& b, const PowerSite& c) {
   return level >= 0 ? Vertex{at, level} : Vertex{};
 }
 
-// As the level rises from 0, the region where all values reach it shrinks from the cell. Each of
-// its edges belongs to one site, and vanishes where its two neighbours meet.
+// As the level rises from 0, the region where all functions are above it shrinks from the whole
+// cell. Each edge of the region belongs to one site and vanishes where its two neighbours meet.
 struct ActiveEdge {
   int site = kOpenEdge;
-  Vec2 start;  // where the edge and the one before it meet at the level that was reached
-  Vertex end;  // where it vanishes, if it is the next to do so
+  Vec2 start;  // where the edge met its predecessor at the current level
+  Vertex end;  // where it vanishes, if it vanishes next
 };
 using ActiveEdges = boost::container::small_vector<ActiveEdge, 24>;
 
-// Follows the edges of the envelope up from the corners of the cell: a tree whose leaves are the
-// corners.
+// Follows the envelope's edges upwards from the corners of the cell. They form a tree whose leaves
+// are the corners.
 class LowerEnvelopeTree {
  public:
   LowerEnvelopeTree(std::span<const PowerSite> sites, const CellPolygon& cell,
@@ -153,18 +153,19 @@ class LowerEnvelopeTree {
   std::size_t After(std::size_t i) const { return i + 1 < edges_.size() ? i + 1 : 0; }
 
   void FindEnd(std::size_t i) {
-    edges_[i].end = VertexOf(sites_[edges_[Before(i)].site], sites_[edges_[i].site],
-                             sites_[edges_[After(i)].site]);
+    edges_[i].end = EnvelopeVertex(sites_[edges_[Before(i)].site], sites_[edges_[i].site],
+                                   sites_[edges_[After(i)].site]);
   }
 
-  // No other site is lower there: none has a part between these.
+  // Returns true if no other site is lower at the vertex. Otherwise a site has its part wholly
+  // inside.
   bool Passes(const Vertex& vertex) const {
     return std::isfinite(vertex.level) && std::ranges::all_of(sites_, [&](const PowerSite& site) {
              return site.At(vertex.at) >= vertex.level - 1e-9 * site.distance2;
            });
   }
 
-  // The border between the parts of edge i and of the edge before it reaches `to`.
+  // Adds the border, up to `to`, between the parts of edge i and of its predecessor.
   void AddBorder(std::size_t i, const Vec2& to) {
     const double twice = Cross(edges_[i].start, to);
     twice_area_[edges_[Before(i)].site] += twice;
@@ -195,8 +196,8 @@ PowerCell::PowerCell(double reach) {
 }
 
 void PowerCell::Cut(const PowerSite& site, int edge) {
-  const double edge4 =
-      site.distance2 * site.distance2;  // 4 |position|^2 times its edge's distance^2
+  const double edge4 = site.distance2 * site.distance2;  // 4 |position|^2 times the squared
+                                                         // distance of the site's edge
   if (edge4 > 4 * site.position.squaredNorm() * furthest2_) {
     return;  // beyond all corners
   }
@@ -217,7 +218,7 @@ bool SibsonAreasByEnvelope(std::span<const PowerSite> sites, const CellPolygon& 
 void SibsonAreasByClipping(std::span<const PowerSite> sites, const CellPolygon& cell,
                            SiteAreas& twice_area) {
   twice_area.assign(sites.size(), 0);
-  const auto contenders = ContendersFor(sites, cell);
+  const auto contenders = FindContenders(sites, cell);
   CellPolygon part, spare;
   for (const int own : contenders) {
     part = cell;
@@ -230,7 +231,7 @@ void SibsonAreasByClipping(std::span<const PowerSite> sites, const CellPolygon& 
         }
       }
     }
-    twice_area[own] = TwiceAreaOf(part);
+    twice_area[own] = TwiceArea(part);
   }
 }
 

@@ -12,8 +12,8 @@
 namespace semblance {
 namespace {
 
-// r in the frame's size. The signs make every kernel conditionally positive definite, so that the
-// smoothing smooths.
+// The kernel of r, in units of the frame's size. The signs make every kernel conditionally positive
+// definite, so that `smoothing` smooths.
 double Kernel(RadialKernel kernel, double r, double width) {
   switch (kernel) {
     case RadialKernel::kLinear:
@@ -32,7 +32,7 @@ double Kernel(RadialKernel kernel, double r, double width) {
 class RadialField {
  public:
   RadialField(const RadialBasis& options, const std::vector<DepthSample>& samples)
-      : kernel_(options.kernel), frame_(FrameOf(samples)) {
+      : kernel_(options.kernel), frame_(FindSampleFrame(samples)) {
     width_ = options.width_mm / frame_.size_mm;
     if (options.tail_degree == 0 && kernel_ != RadialKernel::kCubic) {
       frame_.axes.clear();
@@ -89,7 +89,7 @@ class RadialField {
   SampleFrame frame_;
   double width_ = 1;
   std::vector<Vec3> bases_;
-  Eigen::VectorXd weights_;  // kernels, constant, axes
+  Eigen::VectorXd weights_;  // of kernels, constant, axes
 };
 
 }  // namespace

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Radial basis functions in space: one bump per dowel and a low polynomial, through all dowels.
+// Radial basis functions in space: one function per dowel plus a low-degree polynomial, through all
+// dowels.
 #pragma once
 
 #include <array>
@@ -17,21 +18,21 @@ constexpr auto EnumNames(RadialKernel) {
 
 struct RadialBasis {
   static constexpr std::string_view kName = "radial_basis";
-  RadialKernel kernel = RadialKernel::kLinear;  // needs no width, and does not oscillate
-  double width_mm = 80;                         // of gaussian and wendland_c2
-  int tail_degree = 1;                          // a linear depth is reproduced
-  double smoothing = 0;                         // 0 honours every dowel
-  bool clamp = true;                            // to the dowels' range
-  double max_angle_deg = 90;                    // further turned bone gets no depth
+  RadialKernel kernel = RadialKernel::kLinear;  // needs no width and does not oscillate
+  double width_mm = 80;
+  int tail_degree = 1;
+  double smoothing = 0;
+  bool clamp = true;
+  double max_angle_deg = 90;
 };
 template <class Visitor>
 void Fields(Visitor& visit, RadialBasis& o) {
   visit(
-      FieldInfo{.name = "kernel",
-                .doc = "function of the distance r between dowel and vertex: r (linear), r^3 "
-                       "(cubic), exp(-(r/width)^2) (gaussian), or Wendland's compact C2 function, "
-                       "0 from r = width on; r^2 log r is not among them, as it is right in the "
-                       "plane only"},
+      FieldInfo{
+          .name = "kernel",
+          .doc = "function of the distance r between dowel and vertex: r (linear), r^3 (cubic), "
+                 "exp(-(r/width)^2) (gaussian), or Wendland's compact C2 function, 0 from r = "
+                 "width on; r^2 log r is not among them, as it is right in the plane only"},
       o.kernel);
   visit(FieldInfo{.name = "width_mm",
                   .unit = "mm",
@@ -59,10 +60,10 @@ void Fields(Visitor& visit, RadialBasis& o) {
   MaxAngleField(visit, o.max_angle_deg);
 }
 
-// Distances are straight lines between bases and vertices. A linear tail has only the directions in
-// which the dowels spread: dowels in one plane or line say nothing of the rest. No sd_mm.
-// kNotFacing as AssignWhereFacing. Throws InputError as CheckDepthInput, or if the equations have
-// no finite solution.
+// Distances between bases and vertices are straight. A linear tail uses only the directions in
+// which the dowels spread, because dowels in one plane or line do not determine the others. No
+// sd_mm. kNotFacing as in AssignWhereFacing. Throws InputError as CheckDepthInput does, or if the
+// equations have no finite solution.
 DepthField InterpolateDepth(const RadialBasis& options, const DepthInput& input,
                             const RunContext& run);
 

@@ -13,21 +13,20 @@
 #include "interp/dowels/dowel_samples.h"
 #include "interp/schemes/outside_rule.h"
 #include "interp/stacking/leave_out.h"
-#include "interp/stacking/sd_by_distance.h"
 #include "interp/stacking/stacking_weights.h"
 #include "surfaces/base/farthest_first.h"
 
 namespace semblance {
 namespace {
 
-constexpr std::size_t kMostJudges = 64;  // dowels left out; the cost grows by its fourth power
-constexpr std::size_t kMostSolves = 8;   // of a scheme that has no cheaper way
+constexpr std::size_t kMaxTestDowels = 64;  // left-out dowels; the cost grows with the fourth power
+constexpr std::size_t kMaxSolves = 8;       // of a scheme on the surface without InterpolateLeftOut
 
-std::string_view NameOf(const SingleScheme& scheme) {
+std::string_view SchemeName(const SingleScheme& scheme) {
   return std::visit([](const auto& o) { return o.kName; }, scheme);
 }
 
-// Of dowels that lie far apart, beginning with the first by site; rising.
+// The ascending indices of dowels that lie far apart, beginning with the first by site.
 std::vector<std::size_t> FarApart(std::span<const Dowel> dowels, std::size_t count) {
   std::vector<Vec3> bases;
   for (const Dowel& dowel : dowels) {
@@ -39,25 +38,25 @@ std::vector<std::size_t> FarApart(std::span<const Dowel> dowels, std::size_t cou
   return chosen;
 }
 
-// The dowels that judge, with the areas between them.
-ShownDowels Judges(const DepthInput& input) {
-  const std::vector<std::size_t> kept = FarApart(input.dowels, kMostJudges);
-  ShownDowels judges;
+// The dowels that are left out in turn, with the areas between them.
+ShownDowels ChooseTestDowels(const DepthInput& input) {
+  const std::vector<std::size_t> kept = FarApart(input.dowels, kMaxTestDowels);
+  ShownDowels tested;
   std::map<int, int> index;
   for (const std::size_t i : kept) {
-    index[static_cast<int>(i)] = static_cast<int>(judges.dowels.size());
-    judges.dowels.push_back(input.dowels[i]);
+    index[static_cast<int>(i)] = static_cast<int>(tested.dowels.size());
+    tested.dowels.push_back(input.dowels[i]);
   }
   for (const auto& [a, b, c] : input.network.areas) {
     if (index.contains(a) && index.contains(b) && index.contains(c)) {
-      judges.network.areas.push_back({index[a], index[b], index[c]});
+      tested.network.areas.push_back({index[a], index[b], index[c]});
     }
   }
-  return judges;
+  return tested;
 }
 
-// Dowel i, of all by site, is in fold i modulo count.
-Folds EveryNth(std::span<const Dowel> dowels, std::size_t count) {
+// Puts dowel number i by site into fold i modulo count.
+Folds MakeFolds(std::span<const Dowel> dowels, std::size_t count) {
   std::vector<std::size_t> order(dowels.size());
   for (std::size_t i = 0; i < order.size(); ++i) {
     order[i] = i;
@@ -70,44 +69,46 @@ Folds EveryNth(std::span<const Dowel> dowels, std::size_t count) {
   return folds;
 }
 
-// A scheme without a cheaper way to leave out is solved only so often.
+// Uses few folds for a scheme that needs one solve on the surface per fold.
 Folds FoldsFor(const Interpolator& scheme, std::span<const Dowel> dowels) {
-  const bool is_dear = scheme.needs_surface && !scheme.left_out;
-  return EveryNth(dowels, is_dear ? kMostSolves : dowels.size());
+  const bool is_expensive = scheme.needs_surface && !scheme.left_out;
+  return MakeFolds(dowels, is_expensive ? kMaxSolves : dowels.size());
 }
 
-// Does each fold leave the scheme what it works on?
-bool CanBeJudged(const SingleScheme& scheme, const DepthInput& input) {
+// Returns true if each fold leaves enough dowels and areas for the scheme.
+bool CanBeTested(const SingleScheme& scheme, const DepthInput& input) {
   if (SingleNeedsNetwork(scheme) && input.network.areas.empty()) {
     return false;
   }
   const std::size_t fewest = SingleFewestDowels(scheme);
-  return fewest == 1 ||  // which CheckFolds asks for
-         std::ranges::all_of(FoldsFor(InterpolatorOf(scheme), input.dowels), [&](const auto& fold) {
-           return DepthSamples(Without(input, fold).dowels).size() >= fewest;
-         });
+  return fewest == 1 ||  // CheckFolds ensures one
+         std::ranges::all_of(
+             FoldsFor(MakeInterpolator(scheme), input.dowels), [&](const auto& fold) {
+               return DepthSamples(LeaveOutDowels(input.dowels, input.network, fold).dowels)
+                          .size() >= fewest;
+             });
 }
 
-// What a scheme errs at each judge that it is not shown, in their order.
-Eigen::VectorXd ErrorsOf(const SingleScheme& scheme, const DepthInput& judges,
-                         const RunContext& run) {
-  const Interpolator interpolator = InterpolatorOf(scheme);
-  const Folds folds = FoldsFor(interpolator, judges.dowels);
+// The errors of a scheme at each left-out dowel, in the order of the dowels.
+Eigen::VectorXd LeftOutErrors(const SingleScheme& scheme, const DepthInput& tested,
+                              const RunContext& run) {
+  const Interpolator interpolator = MakeInterpolator(scheme);
+  const Folds folds = FoldsFor(interpolator, tested.dowels);
   const std::vector<DepthField> fields =
-      LeaveOut(interpolator, ExtendNetwork{}, judges, folds, run);
-  Eigen::VectorXd errors(std::ssize(judges.dowels));
+      LeaveOut(interpolator, ExtendNetwork{}, tested, folds, run);
+  Eigen::VectorXd errors(std::ssize(tested.dowels));
   for (std::size_t f = 0; f < folds.size(); ++f) {
     for (std::size_t k = 0; k < folds[f].size(); ++k) {
       const std::size_t i = folds[f][k];
-      errors[static_cast<Eigen::Index>(i)] = fields[f].depth_mm[k] - judges.dowels[i].depth_mm;
+      errors[static_cast<Eigen::Index>(i)] = fields[f].depth_mm[k] - tested.dowels[i].depth_mm;
     }
   }
   return errors;
 }
 
-// Of each judge, by its distance to the nearest other one.
+// The weight of each dowel by its distance to the nearest other one.
 Eigen::VectorXd ImportanceAt(const std::vector<double>& distances_mm) {
-  constexpr double kNearest = 0.3;  // of the mean: nearer ones count no more
+  constexpr double kNearest = 0.3;  // of the mean distance; limits the weight of close pairs
   const Eigen::Map<const Eigen::VectorXd> distance(distances_mm.data(), std::ssize(distances_mm));
   const double mean = distance.mean();
   if (!(mean > 0)) {
@@ -116,7 +117,7 @@ Eigen::VectorXd ImportanceAt(const std::vector<double>& distances_mm) {
   return (distance.array() / mean).max(kNearest).square().inverse();
 }
 
-// The schemes, what they weigh, and how uncertain their mean is.
+// The schemes, their weights, and the uncertainty of their mean.
 struct Mixture {
   std::vector<SingleScheme> schemes;
   Eigen::VectorXd weights;
@@ -132,24 +133,25 @@ Eigen::VectorXd BestAlone(const Eigen::MatrixXd& errors, const Eigen::VectorXd& 
 Mixture Choose(const AutoScheme& options, const DepthInput& input, const RunContext& run) {
   Mixture mixture{options.schemes, {}, {}};
   std::erase_if(mixture.schemes,
-                [&](const SingleScheme& scheme) { return !CanBeJudged(scheme, input); });
+                [&](const SingleScheme& scheme) { return !CanBeTested(scheme, input); });
   if (mixture.schemes.empty()) {
-    mixture.schemes = {options.schemes.front()};  // which says what it lacks
+    mixture.schemes = {options.schemes.front()};  // its error states what is missing
   }
   if (mixture.schemes.size() == 1 || input.dowels.size() < 2) {
     mixture.schemes.resize(1);
     mixture.weights = Eigen::VectorXd::Ones(1);
     return mixture;
   }
-  const ShownDowels shown = Judges(input);
-  const DepthInput judges{input.skull, input.normals, shown.dowels, shown.network, input.expected};
+  const ShownDowels shown = ChooseTestDowels(input);
+  const DepthInput tested{input.skull, input.normals, shown.dowels, shown.network, input.expected};
   Eigen::MatrixXd errors(std::ssize(shown.dowels), std::ssize(mixture.schemes));
   for (Eigen::Index k = 0; k < errors.cols(); ++k) {
-    errors.col(k) = ErrorsOf(mixture.schemes[k], judges, run);
+    errors.col(k) = LeftOutErrors(mixture.schemes[k], tested, run);
   }
   std::vector<double> distances;
   for (std::size_t i = 0; i < shown.dowels.size(); ++i) {
-    distances.push_back(Without(judges, {i}).NearestTo_mm(shown.dowels[i].base));
+    distances.push_back(
+        LeaveOutDowels(shown.dowels, shown.network, {i}).NearestTo_mm(shown.dowels[i].base));
   }
   const Eigen::VectorXd importance = ImportanceAt(distances);
   const bool averages = options.takes == AutoTakes::kAverage;
@@ -161,7 +163,7 @@ Mixture Choose(const AutoScheme& options, const DepthInput& input, const RunCont
   return mixture;
 }
 
-// What a scheme's options are, a few words each: `matern_5_2`, `power 4`, `no clamp`.
+// Describes a scheme's options in a few words each: `matern_5_2`, `power 4`, `no clamp`.
 struct OptionsInWords {
   std::vector<std::string> words;
 
@@ -180,7 +182,7 @@ struct OptionsInWords {
   }
 };
 
-// Name and those options that are not the defaults.
+// The scheme's name and the options that differ from their defaults.
 std::string NameWithOptions(const SingleScheme& scheme) {
   return std::visit(
       []<class Scheme>(Scheme options) {
@@ -197,14 +199,14 @@ std::string NameWithOptions(const SingleScheme& scheme) {
       scheme);
 }
 
-// Name and weight of each scheme, with its options where one stands there twice. A twin in these,
-// too, is numbered.
-std::vector<SchemeShare> SharesOf(const Mixture& mixture) {
+// Name and weight of each scheme. A name that occurs twice gets the options, and if these are equal
+// too, a number.
+std::vector<SchemeShare> MakeShares(const Mixture& mixture) {
   std::map<std::string, int> uses;
   std::vector<SchemeShare> shares;
   for (std::size_t k = 0; k < mixture.schemes.size(); ++k) {
-    const std::string_view plain = NameOf(mixture.schemes[k]);
-    const bool is_alone = std::ranges::count(mixture.schemes, plain, NameOf) == 1;
+    const std::string_view plain = SchemeName(mixture.schemes[k]);
+    const bool is_alone = std::ranges::count(mixture.schemes, plain, SchemeName) == 1;
     const std::string name = is_alone ? std::string(plain) : NameWithOptions(mixture.schemes[k]);
     const int use = ++uses[name];
     shares.push_back({use == 1 ? name : fmt::format("{} {}", name, use),
@@ -213,12 +215,12 @@ std::vector<SchemeShare> SharesOf(const Mixture& mixture) {
   return shares;
 }
 
-// The mean of the fields, each continued where another one has a depth. At least one.
+// The weighted mean of the fields (at least one), each continued where another one has a depth.
 DepthField Mixed(std::vector<DepthField> fields, const std::vector<double>& weights,
                  const DepthInput& input, const RunContext& run) {
   const auto most = std::ranges::max_element(weights) - weights.begin();
   RunContext silent = run;
-  silent.on_event = nullptr;  // the rule may be another one in the end
+  silent.on_event = nullptr;  // the user's outside rule may differ
   DepthField mixed = EmptyDepthField(input.skull.points.size());
   mixed.status = fields[most].status;
   for (DepthField& field : fields) {
@@ -264,7 +266,7 @@ DepthField InterpolateDepth(const AutoScheme& options, const DepthInput& input,
   std::vector<double> weights;
   for (std::size_t k = 0; k < mixture.schemes.size(); ++k) {
     if (const double weight = mixture.weights[static_cast<Eigen::Index>(k)]; weight > 0) {
-      fields.push_back(InterpolatorOf(mixture.schemes[k]).interpolate(input, run));
+      fields.push_back(MakeInterpolator(mixture.schemes[k]).interpolate(input, run));
       weights.push_back(weight);
     }
   }
@@ -273,7 +275,7 @@ DepthField InterpolateDepth(const AutoScheme& options, const DepthInput& input,
   if (mixture.schemes.size() > 1) {
     StateSd(mixture.sd, input, run, field);
   }
-  field.shares = SharesOf(mixture);
+  field.shares = MakeShares(mixture);
   return field;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Depth without choosing a scheme: several are asked for dowels that they are not shown, and are
-// averaged by what they are worth there (stacking), or the best of them is taken.
+// Depth without the choice of a scheme: several schemes predict left-out dowels and are averaged by
+// their errors there (stacking), or the best of them is used.
 #pragma once
 
 #include <array>
@@ -18,42 +18,42 @@ struct AutoScheme {
   static constexpr std::string_view kName = "auto";
   std::vector<SingleScheme> schemes = {RadialBasis{}, Kriging{},
                                        Kriging{.covariance = Covariance::kMatern52}};
-  AutoTakes takes = AutoTakes::kAverage;  // the average, or the best alone
-  double caution = 0;                     // of stacking_weights.h
+  AutoTakes takes = AutoTakes::kAverage;
+  double caution = 0;
 };
 template <class Visitor>
 void Fields(Visitor& visit, AutoScheme& o) {
   visit(FieldInfo{.name = "schemes",
                   .min = 1,
-                  .doc = "what is chosen among, each with options of its own; the same scheme may "
-                         "stand there with several"},
+                  .doc = "candidate schemes, each with its own options; a scheme may appear "
+                         "several times with different options"},
         o.schemes);
   visit(FieldInfo{.name = "takes",
-                  .doc = "average: all, with the weights (0 or more, of sum 1) that err least at "
-                         "dowels left out; best: the one that errs least there"},
+                  .doc =
+                      "average: all schemes, with the weights (>= 0, sum 1) that have the smallest "
+                      "error at left-out dowels; best: the scheme with the smallest error"},
         o.takes);
   visit(FieldInfo{.name = "caution",
                   .min = 0,
                   .max = 1e6,
-                  .doc = "of `average`: how strongly the weights are drawn to equal ones; 0: "
-                         "not at all, which often leaves one scheme alone"},
+                  .doc = "for `average`: strength of the pull towards equal weights; 0: none, "
+                         "which often leaves one scheme alone"},
         o.caution);
 }
 
-// Each dowel is left out by itself, and counts by the inverse square of its distance to the nearest
-// other one (none below 0.3 of the mean distance), for bone between dowels is nearer to them than
-// they are to each other, and the outermost ones only tell how a scheme extrapolates. Of more than
-// 64, the choice is made by 64 that lie far apart.
-// A scheme on the surface without a cheaper way (InterpolateLeftOut) is solved eight times at most.
-// The depth is the weighted mean of the schemes that have a depth at the vertex; one that has none
-// there is continued by the `extend` rule. Where none has one, the status is that of the scheme
-// with the most weight. One scheme alone, or a single dowel, which can tell nothing: the first, as
-// it is, with its own sd. Otherwise sd_mm is sd_by_distance.h's from the mixture's errors at
-// left-out dowels, with weights of the other dowels. A scheme is passed over that cannot be
-// judged: one on the network where there is no area, one of which a left-out fold leaves too few
-// dowels for its mean's factors. `shares` of the field name the schemes and their weights: of
-// schemes of one name, also by the options that are not the defaults (`kriging matern_5_2`). Throws
-// as the schemes do.
+// Each dowel is left out in turn. Its error is weighted by the inverse square of its distance to
+// the nearest other dowel (at least 0.3 of the mean distance), because bone between dowels is
+// nearer to them than they are to each other, and because the outermost dowels measure only
+// extrapolation. At most 64 dowels, which lie far apart, decide. A scheme on the surface without
+// InterpolateLeftOut is solved at most eight times. The depth is the weighted mean of the schemes.
+// A scheme without a depth at a vertex is continued by the `extend` rule, if another scheme has a
+// depth there; otherwise the status is that of the scheme with the largest weight. sd_mm is
+// SdByDistance, fitted to the mixture's errors at left-out dowels with weights from the other
+// dowels. With a single scheme or a single dowel the result is the first scheme's, with its own sd.
+// A scheme is skipped if it cannot be tested: a scheme on the network without an area, or with too
+// few dowels left for its mean's factors. `shares` lists the schemes and weights; schemes of the
+// same name are distinguished by the options that differ from the defaults (`kriging matern_5_2`).
+// Throws as the schemes do.
 DepthField InterpolateDepth(const AutoScheme& options, const DepthInput& input,
                             const RunContext& run);
 

@@ -4,11 +4,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
+#include <vector>
 
 #include "interp/dowels/dowel_samples.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
@@ -33,8 +36,8 @@ struct Bases {
   }
 };
 
-// What the scheme gives, before the rule. A scheme on the network of which the fold leaves no area,
-// or one to which it leaves too few dowels, knows no depth anywhere.
+// The scheme's prediction before the outside rule. It is empty if the fold leaves no area to a
+// scheme on the network, or too few dowels.
 DepthField Interpolated(const Interpolator& scheme, const DepthInput& input,
                         const RunContext& run) {
   const bool cannot = (scheme.needs_network && input.network.areas.empty()) ||
@@ -42,10 +45,10 @@ DepthField Interpolated(const Interpolator& scheme, const DepthInput& input,
   return cannot ? EmptyDepthField(input.skull.points.size()) : scheme.interpolate(input, run);
 }
 
-// Of each dowel the skull's vertex at which a field on the skull is asked for its depth.
+// The vertex at which a field on the skull predicts each dowel.
 std::vector<std::size_t> NearestCorners(const DepthInput& input) {
   if (input.skull.triangles.empty()) {
-    return {};  // which the scheme will say, by its name
+    return {};  // the scheme will throw, with its name
   }
   const MeshQuery query(input.skull);
   std::vector<std::size_t> corners;
@@ -76,14 +79,14 @@ DepthField AtCorners(const Interpolator& scheme, const DepthInput& all, const Sh
 
 std::vector<DepthField> OneByOne(const Interpolator& scheme, const DepthInput& input,
                                  const Folds& folds, const RunContext& run) {
-  RunContext of_fold;  // silent: events must not come from several threads
+  RunContext of_fold;  // silent, because events must not come from several threads
   of_fold.stop_token = run.stop_token;
   const std::vector<std::size_t> corners =
       scheme.needs_surface ? NearestCorners(input) : std::vector<std::size_t>{};
   std::vector<DepthField> fields(folds.size());
   ParallelFor(folds.size(), run.threads, 1, [&](std::size_t f) {
     run.ThrowIfStopped();
-    const ShownDowels shown = Without(input, folds[f]);
+    const ShownDowels shown = LeaveOutDowels(input.dowels, input.network, folds[f]);
     fields[f] = scheme.needs_surface
                     ? AtCorners(scheme, input, shown, folds[f], corners, of_fold)
                     : Interpolated(scheme, Bases(input, folds[f]).Given(shown), of_fold);
@@ -113,9 +116,13 @@ void CheckFolds(const Folds& folds, std::size_t dowels) {
   }
 }
 
+constexpr std::size_t kMinErrors = 3;               // errors needed for a fit
+constexpr double kNearest = 0.1, kFurthest = 2;     // limits, relative to the mean distance
+constexpr double kHalfWithin = 0.6744897501960817;  // median of |x| for a standard normal x
+
 }  // namespace
 
-Interpolator InterpolatorOf(const SingleScheme& scheme) {
+Interpolator MakeInterpolator(const SingleScheme& scheme) {
   Interpolator interpolator{.interpolate = {},
                             .left_out = {},
                             .needs_surface = SingleNeedsSurface(scheme),
@@ -149,10 +156,36 @@ std::vector<DepthField> LeaveOut(const Interpolator& scheme, const OutsideRule& 
   RunContext silent;
   silent.stop_token = run.stop_token;
   for (std::size_t f = 0; f < folds.size(); ++f) {
-    fields[f] = ApplyOutsideRule(rule, Bases(input, folds[f]).Given(Without(input, folds[f])),
-                                 std::move(fields[f]), silent);
+    fields[f] = ApplyOutsideRule(
+        rule, Bases(input, folds[f]).Given(LeaveOutDowels(input.dowels, input.network, folds[f])),
+        std::move(fields[f]), silent);
   }
   return fields;
+}
+
+double SdByDistance::At(double to_nearest_mm) const {
+  return scale_mm * std::sqrt(std::clamp(to_nearest_mm / distance_mm, kNearest, kFurthest));
+}
+
+SdByDistance FitSdByDistance(std::span<const double> errors_mm,
+                             std::span<const double> distances_mm) {
+  SdByDistance unit{.scale_mm = 1, .distance_mm = 0};
+  std::vector<std::size_t> known;
+  for (std::size_t i = 0; i < errors_mm.size(); ++i) {
+    if (std::isfinite(errors_mm[i]) && std::isfinite(distances_mm[i])) {
+      known.push_back(i);
+      unit.distance_mm += distances_mm[i];
+    }
+  }
+  if (known.size() < kMinErrors || !(unit.distance_mm > 0)) {
+    return {};
+  }
+  unit.distance_mm /= static_cast<double>(known.size());
+  std::vector<double> ratios;
+  for (const std::size_t i : known) {
+    ratios.push_back(std::abs(errors_mm[i]) / unit.At(distances_mm[i]));
+  }
+  return {Quantile(ratios, 0.5) / kHalfWithin, unit.distance_mm};
 }
 
 }  // namespace semblance

@@ -7,7 +7,7 @@ namespace semblance {
 namespace {
 
 template <class Scheme>
-bool GoesAlong(const Scheme& scheme) {
+bool WorksAlongSurface(const Scheme& scheme) {
   if constexpr (requires { scheme.distance == DowelDistance::kGeodesic; }) {
     if (scheme.distance == DowelDistance::kGeodesic) {
       return true;
@@ -25,7 +25,7 @@ bool GoesAlong(const Scheme& scheme) {
 }  // namespace
 
 bool SingleNeedsSurface(const SingleScheme& scheme) {
-  return std::visit([](const auto& options) { return GoesAlong(options); }, scheme);
+  return std::visit([](const auto& options) { return WorksAlongSurface(options); }, scheme);
 }
 
 bool SingleNeedsExpected(const SingleScheme& scheme) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The schemes that make a depth from dowels by themselves: what `auto` chooses among. A new one is
-// one entry here.
+// The schemes that compute depths from dowels, among which `auto` chooses. A new scheme adds one
+// entry here.
 #pragma once
 
 #include <cstddef>
@@ -8,16 +8,12 @@
 
 #include "interp/kriging/kriging.h"
 #include "interp/kriging/surface_matern.h"
-#include "interp/schemes/barycentric.h"
-#include "interp/schemes/biharmonic.h"
 #include "interp/schemes/harmonic.h"
-#include "interp/schemes/inverse_distance.h"
-#include "interp/schemes/mean.h"
 #include "interp/schemes/moving_least_squares.h"
 #include "interp/schemes/natural_neighbour.h"
-#include "interp/schemes/nearest.h"
-#include "interp/schemes/network_spline.h"
+#include "interp/schemes/network_schemes.h"
 #include "interp/schemes/radial_basis.h"
+#include "interp/schemes/simple_schemes.h"
 
 namespace semblance {
 
@@ -25,16 +21,16 @@ using SingleScheme =
     std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis, MovingLeastSquares,
                  Kriging, SurfaceMatern, Harmonic, Biharmonic, NaturalNeighbour, NetworkSpline>;
 
-// Does the scheme work along the skull's surface, so that points alone do not do?
+// Returns true if the scheme works along the skull's surface and needs its triangles.
 bool SingleNeedsSurface(const SingleScheme& scheme);
 
-// Does the scheme vary around DepthInput::expected?
+// Returns true if the scheme's mean is DepthInput::expected.
 bool SingleNeedsExpected(const SingleScheme& scheme);
 
-// Does the scheme work on the dowel network, so that one without an area will not do?
+// Returns true if the scheme needs a dowel network with at least one area.
 bool SingleNeedsNetwork(const SingleScheme& scheme);
 
-// The fewest dowels, at places of their own, with which the scheme can be asked: 1 of most.
+// The smallest number of dowels at distinct places that the scheme needs; 1 for most schemes.
 std::size_t SingleFewestDowels(const SingleScheme& scheme);
 
 }  // namespace semblance

@@ -9,10 +9,10 @@
 namespace semblance {
 namespace {
 
-// The weights of sum 1 with the least w' Q w - 2 b' w over some of the predictors, else 0; they may
-// be below 0.
-Eigen::VectorXd LeastOver(const std::vector<Eigen::Index>& free, const Eigen::MatrixXd& q,
-                          const Eigen::VectorXd& b) {
+// Minimises w' Q w - 2 b' w over the free predictors with weights of sum 1, which may be negative;
+// the other weights are 0.
+Eigen::VectorXd MinimumOver(const std::vector<Eigen::Index>& free, const Eigen::MatrixXd& q,
+                            const Eigen::VectorXd& b) {
   const Eigen::Index n = std::ssize(free);
   Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(n + 1, n + 1);
   Eigen::VectorXd right = Eigen::VectorXd::Ones(n + 1);
@@ -28,11 +28,11 @@ Eigen::VectorXd LeastOver(const std::vector<Eigen::Index>& free, const Eigen::Ma
   return weights;
 }
 
-// The most favourable way to more weight of a predictor that has none; -1 if none pays.
-Eigen::Index WorthFreeing(const Eigen::VectorXd& weights, const Eigen::MatrixXd& q,
-                          const Eigen::VectorXd& b) {
+// The predictor without weight whose increase reduces the cost fastest; -1 if none does.
+Eigen::Index FindPredictorToFree(const Eigen::VectorXd& weights, const Eigen::MatrixXd& q,
+                                 const Eigen::VectorXd& b) {
   const Eigen::VectorXd slope = q * weights - b;
-  const double level = slope.dot(weights);  // equal for all that have weight
+  const double level = slope.dot(weights);  // equal for all predictors with a weight
   const double least_gain = 1e-10 * q.diagonal().maxCoeff();
   Eigen::Index best = -1;
   for (Eigen::Index k = 0; k < slope.size(); ++k) {
@@ -43,12 +43,12 @@ Eigen::Index WorthFreeing(const Eigen::VectorXd& weights, const Eigen::MatrixXd&
   return best;
 }
 
-// Goes from `weights` to the least over `free`, as often as it takes to stay at or above 0; what
-// reaches 0 is free no more.
-void Settle(std::vector<Eigen::Index>& free, const Eigen::MatrixXd& q, const Eigen::VectorXd& b,
-            Eigen::VectorXd& weights) {
+// Moves `weights` to the minimum over `free` and repeats until no weight would become negative; a
+// weight that reaches 0 is removed from `free`.
+void MoveToMinimum(std::vector<Eigen::Index>& free, const Eigen::MatrixXd& q,
+                   const Eigen::VectorXd& b, Eigen::VectorXd& weights) {
   while (true) {
-    const Eigen::VectorXd aim = LeastOver(free, q, b);
+    const Eigen::VectorXd aim = MinimumOver(free, q, b);
     double share = 1;
     Eigen::Index stops = -1;
     for (const Eigen::Index k : free) {
@@ -68,7 +68,8 @@ void Settle(std::vector<Eigen::Index>& free, const Eigen::MatrixXd& q, const Eig
 
 }  // namespace
 
-// An active set method: from the best predictor alone, one more has weight as long as it pays.
+// An active set method: starts with the best single predictor and frees one more as long as this
+// reduces the cost.
 Eigen::VectorXd StackingWeights(const Eigen::MatrixXd& errors, const Eigen::VectorXd& importance,
                                 double caution) {
   const Eigen::Index n = errors.cols();
@@ -77,18 +78,18 @@ Eigen::VectorXd StackingWeights(const Eigen::MatrixXd& errors, const Eigen::Vect
   const double ridge = caution * q.diagonal().minCoeff(&best);
   Eigen::VectorXd weights = Eigen::VectorXd::Unit(n, best);
   if (!(q.diagonal().maxCoeff() > 0)) {
-    return weights;  // all are exact
+    return weights;  // all predictors are exact
   }
   q.diagonal().array() += ridge;
   const Eigen::VectorXd b = Eigen::VectorXd::Constant(n, ridge / static_cast<double>(n));
   std::vector<Eigen::Index> free = {best};
   for (Eigen::Index round = 0; round < 3 * n; ++round) {
-    const Eigen::Index next = WorthFreeing(weights, q, b);
+    const Eigen::Index next = FindPredictorToFree(weights, q, b);
     if (next < 0) {
       break;
     }
     free.push_back(next);
-    Settle(free, q, b, weights);
+    MoveToMinimum(free, q, b, weights);
   }
   weights = weights.cwiseMax(0);
   return weights / weights.sum();

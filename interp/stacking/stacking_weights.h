@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How much to trust each of several predictors, from their errors on what they were not shown
-// (stacked regressions: Wolpert 1992, Neural Networks 5; Breiman 1996, Machine Learning 24).
+// Stacked regression: weights of several predictors from their errors on left-out data (Wolpert
+// 1992, Neural Networks 5; Breiman 1996, Machine Learning 24).
 #pragma once
 
 #include <Eigen/Core>
 
 namespace semblance {
 
-// errors: one row per point, one column per predictor, finite, at least one of each; importance: of
-// each point, above 0. The weights >= 0 of sum 1 whose mixed predictor has the least mean squared
-// error, by importance, plus caution times the least mean squared error of one predictor times the
-// squared distance of the weights from equal ones. caution >= 0; large, all count alike.
+// Computes the weights (>= 0, sum 1) that minimise the mixture's mean squared error, weighted by
+// importance, plus caution * (smallest mean squared error of a single predictor) * (squared
+// distance of the weights from equal weights). errors: one row per point and one column per
+// predictor, finite, at least one of each. importance: one per point, > 0. caution >= 0; a large
+// value gives equal weights.
 Eigen::VectorXd StackingWeights(const Eigen::MatrixXd& errors, const Eigen::VectorXd& importance,
                                 double caution);
 
-// What the mixture errs at each point if its weights come from the other points alone: row sums of
-// errors times weights.
+// The mixture's error at each point with weights from all other points.
 Eigen::VectorXd StackedErrors(const Eigen::MatrixXd& errors, const Eigen::VectorXd& importance,
                               double caution);
 

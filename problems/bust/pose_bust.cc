@@ -33,11 +33,6 @@ constexpr double kScalpReach_mm = 20;
 constexpr double kEar_mm = 45;  // round the ear
 constexpr int kRounds = 2;
 
-double SmoothStep(double x) {
-  const double t = std::clamp(x, 0.0, 1.0);
-  return t * t * (3 - 2 * t);
-}
-
 // How far a face is to be followed: not at its border, where nothing holds it.
 double TrustAt(const Vec2& uv) {
   const double side = SmoothStep(std::min(uv.x(), 1 - uv.x()) / 0.08);

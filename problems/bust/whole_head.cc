@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -18,7 +19,6 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/hspline_json.h"
-#include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {
 namespace {

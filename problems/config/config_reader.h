@@ -12,7 +12,6 @@
 #include <string_view>
 
 #include "problems/config/config_tree.h"
-#include "surfaces/base/auto_or.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {

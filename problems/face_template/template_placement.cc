@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "fitting/problem/placement.h"
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 #include "problems/face_template/head_formula.h"
 #include "problems/face_template/template_sites.h"
 #include "problems/subject/sites.h"

@@ -4,10 +4,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <nlohmann/json.hpp>
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
-#include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {
 namespace {

@@ -11,7 +11,7 @@
 #include "problems/pictures/pictures.h"
 #include "problems/subject/phantom.h"
 #include "problems/subject/sites.h"
-#include "surfaces/base/base64.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"

@@ -9,10 +9,9 @@
 #include <utility>
 #include <vector>
 
-#include "problems/output/manifest.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/output/file_hashes.h"
+#include "surfaces/base/encoding.h"
 
 #include <system_error>
-
-#include "problems/output/manifest.h"
 
 namespace semblance {
 

@@ -9,8 +9,8 @@
 #include <system_error>
 #include <utility>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {

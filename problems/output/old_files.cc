@@ -7,7 +7,7 @@
 #include <regex>
 #include <system_error>
 
-#include "problems/output/manifest.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

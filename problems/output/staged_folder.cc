@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "problems/output/old_files.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {

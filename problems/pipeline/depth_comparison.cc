@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "interp/evaluation/calibration.h"
+#include "interp/evaluation/scores.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 

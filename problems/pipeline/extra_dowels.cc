@@ -9,7 +9,7 @@
 #include <optional>
 #include <set>
 
-#include "interp/dowels/network_insertion.h"
+#include "interp/dowels/dowel_network.h"
 #include "problems/conditional/condition_depths.h"
 #include "problems/config/spelling_suggestion.h"
 #include "problems/face_template/template_source.h"

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "interp/dowels/depth_field.h"
+#include "interp/dowels/depth_input.h"
 #include "interp/dowels/dowel_network.h"
 #include "problems/pipeline/case.h"
 #include "surfaces/mesh/mesh_query.h"

@@ -4,8 +4,8 @@
 #include <cstring>
 #include <type_traits>
 
-#include "problems/output/manifest.h"
 #include "problems/pipeline/stage_key.h"
+#include "surfaces/base/encoding.h"
 
 namespace semblance {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <string_view>
 
-#include "surfaces/base/out_of_memory.h"
+#include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "fitting/uncertainty/error_propagation.h"
-#include "interp/evaluation/calibration.h"
+#include "interp/evaluation/scores.h"
 #include "interp/kriging/kriging_process.h"
 #include "problems/conditional/condition_depths.h"
 #include "problems/pipeline/uncertainty.h"

@@ -16,8 +16,6 @@
 #include "fitting/fit.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
-#include "surfaces/hspline_query/adaptive_tessellation.h"
-#include "surfaces/hspline_query/surface_cells.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

@@ -17,8 +17,8 @@
 #include <utility>
 
 #include "problems/output/manifest.h"
-#include "problems/volumes/gzip_bytes.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 #include "surfaces/base/npy.h"

@@ -20,7 +20,8 @@
 #include "problems/pipeline/step_clock.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/point_table.h"
-#include "surfaces/base/auto_or.h"
+#include "surfaces/base/fields.h"
+#include "surfaces/hspline_query/tessellate.h"
 
 namespace semblance {
 

@@ -8,9 +8,9 @@
 
 #include "problems/config/config.h"
 #include "problems/output/file_hashes.h"
-#include "problems/output/manifest.h"
 #include "problems/population/population_folder.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

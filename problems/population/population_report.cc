@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "interp/evaluation/calibration.h"
+#include "interp/evaluation/scores.h"
 #include "problems/pictures/image.h"
 #include "problems/pictures/pictures.h"
 #include "problems/plots/heat_map.h"

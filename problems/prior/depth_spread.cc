@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <utility>
 
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <string>
 
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 #include "problems/prior/prior_target.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/parallel.h"

@@ -19,7 +19,7 @@
 #include "problems/prior/hspline_prior.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {

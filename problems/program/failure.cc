@@ -19,7 +19,6 @@
 #include "problems/config/terminal_text.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
-#include "surfaces/base/out_of_memory.h"
 
 namespace semblance {
 namespace {

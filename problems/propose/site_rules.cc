@@ -9,7 +9,7 @@
 #include <limits>
 #include <optional>
 
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 

@@ -13,7 +13,7 @@
 #include "problems/plots/svg_parts.h"
 #include "problems/report/report_assets.h"
 #include "surfaces/base/atomic_file.h"
-#include "surfaces/base/base64.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

@@ -15,6 +15,7 @@
 #include "problems/report/run_report.h"
 #include "problems/report/scene_json.h"
 #include "surfaces/base/csv.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/mesh/mesh_query.h"

@@ -25,7 +25,6 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/face_export.h"
-#include "surfaces/hspline_files/json_parts.h"
 
 namespace semblance {
 namespace {

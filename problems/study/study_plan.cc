@@ -17,6 +17,7 @@
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/study/study_metrics.h"
+#include "surfaces/base/encoding.h"
 
 namespace semblance {
 namespace {

@@ -8,8 +8,8 @@
 #include <span>
 #include <utility>
 
-#include "problems/output/manifest.h"
 #include "problems/output/staged_folder.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/json_text.h"

@@ -8,7 +8,7 @@
 #include <limits>
 
 #include "fitting/problem/placement.h"
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"

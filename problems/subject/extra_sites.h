@@ -12,7 +12,6 @@
 
 #include "problems/config/config_tree.h"
 #include "problems/subject/average_skull.h"
-#include "surfaces/base/auto_or.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "interp/dowels/site_code.h"
+#include "interp/dowels/dowel.h"
 
 namespace semblance {
 

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "problems/output/manifest.h"
-#include "surfaces/base/base64.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/decimate/decimate.h"
 

@@ -14,7 +14,7 @@
 #include <string>
 #include <string_view>
 
-#include "problems/volumes/gzip_bytes.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 

@@ -10,7 +10,6 @@
 #include <utility>
 
 #include "problems/config/config.h"
-#include "problems/output/manifest.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/stage_key.h"
@@ -21,8 +20,9 @@
 #include "problems/workbench/bench_incoming.h"
 #include "problems/workbench/bench_pull.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
-#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {

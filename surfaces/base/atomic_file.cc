@@ -8,6 +8,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <atomic>
+#include <cctype>
 #include <cerrno>
 #include <cstdint>
 #include <fstream>
@@ -17,7 +19,6 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {
@@ -26,8 +27,8 @@ namespace fs = std::filesystem;
 
 std::string Reason(int error_number) { return std::generic_category().message(error_number); }
 
-// A file descriptor that is closed, and a temporary file that is removed, whatever happens. It is
-// locked as long as it is written, which tells a sweep that somebody does.
+// Owns a temporary file: closes its descriptor and removes the file unless it was renamed. The file
+// stays locked while it is written, so that a sweep leaves it alone.
 class TemporaryFile {
  public:
   TemporaryFile(const fs::path& target, fs::path temporary)
@@ -38,7 +39,7 @@ class TemporaryFile {
       if (descriptor_ < 0) {
         Fail();
       }
-      ::flock(descriptor_, LOCK_EX);  // where there are no locks, no sweep gets one either
+      ::flock(descriptor_, LOCK_EX);  // without locks on this system, a sweep gets no lock either
     } while (WasSwept());
   }
   ~TemporaryFile() {
@@ -60,7 +61,7 @@ class TemporaryFile {
     }
   }
 
-  // The last step: from here on the target holds the new bytes.
+  // The last step: afterwards the target holds the new bytes.
   void Rename(Durability durability) {
     const bool sync = durability == Durability::kSynced;
     if ((sync && ::fsync(descriptor_) != 0) || ::close(std::exchange(descriptor_, -1)) != 0 ||
@@ -71,7 +72,7 @@ class TemporaryFile {
   }
 
  private:
-  // Between its creation and its lock a sweep may have taken the file for a leftover.
+  // A sweep may have removed the file between its creation and its lock.
   bool WasSwept() const {
     struct stat file {};
     return ::fstat(descriptor_, &file) == 0 && file.st_nlink == 0;
@@ -97,17 +98,17 @@ class TemporaryFile {
   bool renamed_ = false;
 };
 
-// What comes after the size that the system states: all of a pipe, the rest of a file that grew.
+// Reads the bytes beyond the size that the system states: those of a pipe, or of a file that grew.
 void AppendRest(std::ifstream& file, const fs::path& path, std::string& bytes) {
-  constexpr std::size_t kBlock = 1 << 20, kMost = std::size_t{256} << 20;
+  constexpr std::size_t kBlock = 1 << 20, kMaxBytes = std::size_t{256} << 20;
   const std::size_t before = bytes.size();
-  while (file && bytes.size() - before <= kMost) {
+  while (file && bytes.size() - before <= kMaxBytes) {
     const std::size_t at = bytes.size();
     bytes.resize(at + kBlock);
     file.read(bytes.data() + at, kBlock);
     bytes.resize(at + static_cast<std::size_t>(file.gcount()));
   }
-  if (bytes.size() - before > kMost) {
+  if (bytes.size() - before > kMaxBytes) {
     throw IoError(
         fmt::format("{}: more than 256 MB come out of what is not a regular file; save them in one "
                     "and name that",
@@ -138,6 +139,40 @@ std::string ReadBytes(const fs::path& path) {
                             fs::file_size(path, ignored) >> 20));
 }
 
+// Removes the digits at the end of a name; false if there are none.
+bool RemoveDigits(std::string_view& name) {
+  const std::size_t before = name.size();
+  while (!name.empty() && std::isdigit(static_cast<unsigned char>(name.back())) != 0) {
+    name.remove_suffix(1);
+  }
+  return name.size() < before;
+}
+
+// Recognises the names that TemporaryBeside makes: ".face.ply.123-4.tmp".
+bool IsTemporaryName(std::string_view name) {
+  constexpr std::string_view kEnding = ".tmp";
+  if (!name.starts_with('.') || !name.ends_with(kEnding)) {
+    return false;
+  }
+  name.remove_suffix(kEnding.size());
+  if (!RemoveDigits(name) || !name.ends_with('-')) {
+    return false;
+  }
+  name.remove_suffix(1);
+  return RemoveDigits(name) && name.ends_with('.') && name.size() > 2;
+}
+
+// Removes the file unless a process has locked it.
+void RemoveIfUnlocked(const fs::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDWR | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor >= 0) {
+    if (::flock(descriptor, LOCK_EX | LOCK_NB) == 0) {
+      ::unlink(path.c_str());
+    }
+    ::close(descriptor);
+  }
+}
+
 }  // namespace
 
 void WriteFileAtomically(const fs::path& path, std::string_view bytes, Durability durability) {
@@ -163,6 +198,30 @@ std::string ReadFileBytes(const fs::path& path) {
     FailTooLarge(path);
   } catch (const std::length_error&) {
     FailTooLarge(path);
+  }
+}
+
+fs::path TemporaryBeside(const fs::path& path) {
+  static std::atomic<int> count{0};
+  return path.parent_path() /
+         fmt::format(".{}.{}-{}.tmp", path.filename().string(), ::getpid(), count++);
+}
+
+void SweepTemporaryFiles(const fs::path& folder) {
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    if (IsTemporaryName(at->path().filename().string())) {
+      RemoveIfUnlocked(at->path());
+    }
+  }
+}
+
+void SyncFolder(const fs::path& folder) {
+  const int descriptor =
+      ::open(folder.empty() ? "." : folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor >= 0) {
+    ::fsync(descriptor);
+    ::close(descriptor);
   }
 }
 

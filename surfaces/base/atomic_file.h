@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whole files: read at once; written so that they are either the old one or the new one, never half
-// of one.
+// Whole files: reads them at once, and writes them so that a reader finds either the old or the new
+// file, never half of one.
 #pragma once
 
 #include <filesystem>
@@ -9,19 +9,30 @@
 
 namespace semblance {
 
-// What a written file survives. kUnsynced: the end of the process, however it ends, but after a
-// power failure the file may be empty. That spares two waits for the disk, and is for files that
-// are checked when read and can be made again.
+// kSynced files survive a power failure. kUnsynced files survive the end of the process, but may be
+// empty after a power failure. kUnsynced saves two waits for the disk. Use it for files that are
+// verified when they are read and can be computed again.
 enum class Durability { kSynced, kUnsynced };
 
-// Writes a temporary file beside `path`, syncs it, and renames it to `path`, which then holds
-// exactly `bytes`. On failure throws IoError with the path and the system's reason; `path` is then
-// as it was, and no temporary file is left.
+// Writes `bytes` to a temporary file in the folder of `path`, syncs it, and renames it to `path`.
+// On failure throws IoError with the path and the system's reason; then `path` is unchanged and no
+// temporary file remains.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes,
                          Durability durability = Durability::kSynced);
 
-// The whole file. Throws IoError with the path and the reason: no such file, a folder, or what the
-// system says.
+// Reads the whole file. Throws IoError with the path and the reason: no such file, a folder, or the
+// system's reason.
 std::string ReadFileBytes(const std::filesystem::path& path);
+
+// Makes the name of a temporary file for `path`: "dir/.face.ply.123-4.tmp" for "dir/face.ply", with
+// the process number and a counter.
+std::filesystem::path TemporaryBeside(const std::filesystem::path& path);
+
+// Removes the temporary files that killed processes left directly in `folder`. A file that a living
+// process still writes is locked (flock) and stays. All other files stay.
+void SweepTemporaryFiles(const std::filesystem::path& folder);
+
+// Makes renames in `folder` survive a power failure, if the file system supports it.
+void SyncFolder(const std::filesystem::path& folder);
 
 }  // namespace semblance

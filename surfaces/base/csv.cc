@@ -32,7 +32,7 @@ std::string_view Trimmed(std::string_view text) {
 CsvReader::CsvReader(std::string_view text, std::string_view name, const CsvDialect& dialect)
     : rest_(text), name_(name), dialect_(dialect) {
   if (rest_.starts_with("\xEF\xBB\xBF")) {
-    rest_.remove_prefix(3);  // what spreadsheets put before UTF-8
+    rest_.remove_prefix(3);  // the byte order mark that spreadsheets write
   }
   ReadCells();
   columns_.assign(cells_.begin(), cells_.end());
@@ -74,7 +74,7 @@ bool CsvReader::NextRow() {
   return true;
 }
 
-// The number that is the whole of `text`, or nothing; nan and inf are numbers here.
+// Parses the whole of `text` as a number, or returns nothing. Accepts nan and inf.
 std::optional<double> CsvReader::ToNumber(std::string_view text) const {
   std::string with_point;
   if (dialect_.decimal != '.') {
@@ -84,7 +84,7 @@ std::optional<double> CsvReader::ToNumber(std::string_view text) const {
     std::replace(with_point.begin(), with_point.end(), dialect_.decimal, '.');
     text = with_point;
   }
-  if (text.starts_with('+')) {  // from_chars takes no plus sign
+  if (text.starts_with('+')) {  // from_chars rejects a plus sign
     text.remove_prefix(1);
   }
   double value = kNaN;
@@ -130,7 +130,7 @@ void CsvReader::ReadCells() {
   ++next_line_;
 }
 
-// Up to the next separator or the end of the line, which stay.
+// Takes the text up to the next separator or the end of the line, which stay in rest_.
 std::string_view CsvReader::TakePlain() {
   std::size_t end = 0;
   while (end < rest_.size() && rest_[end] != dialect_.separator && rest_[end] != '\n') {
@@ -182,7 +182,7 @@ void CsvWriter::Separate() {
 void CsvWriter::AddNumber(double number) {
   Separate();
   if (std::isfinite(number)) {
-    std::array<char, 32> digits;  // 24 are the most
+    std::array<char, 32> digits;  // a double needs at most 24
     text_.append(digits.data(), fmt::format_to(digits.data(), "{}", number));
   }
 }

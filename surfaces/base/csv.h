@@ -13,37 +13,38 @@
 
 namespace semblance {
 
-// How a table is written: in countries with a decimal comma, spreadsheets separate by semicolons.
+// Separator and decimal sign. In countries with a decimal comma, spreadsheets separate by
+// semicolons.
 struct CsvDialect {
   char separator = ',';
   char decimal = '.';
 };
 
-// Reads a table row by row. A cell may be quoted, with "" for a quote inside; blanks around a cell
-// that is not quoted are dropped, and so is a byte order mark. Every fault is an IoError
-// "name:line: what": columns of one name, a row with more or fewer cells than columns, a quote that
-// does not end, and what Fail is called for. The text must outlive the reader.
+// Reads a table row by row. A cell may be quoted, with "" for a quote inside. Blanks around an
+// unquoted cell are dropped, and so is a byte order mark. Every fault throws IoError "name:line:
+// fault": repeated column names, a row whose cells do not match the columns, an unclosed quote, and
+// the faults that the caller reports with Fail. The text must outlive the reader.
 class CsvReader {
  public:
-  // name: of the file, for messages. Reads the names of the columns.
+  // Reads the column names. name: the file's name, for messages.
   CsvReader(std::string_view text, std::string_view name, const CsvDialect& dialect = {});
 
   const std::vector<std::string>& Columns() const { return columns_; }
-  // The index of the column, or nothing.
+  // Index of the column, or nothing.
   std::optional<std::size_t> Find(std::string_view column) const;
-  // The index of the column; fails if there is none.
+  // Index of the column; fails if the column is missing.
   std::size_t ColumnOf(std::string_view column) const;
 
-  // Moves on to the next row; false after the last one.
+  // Reads the next row; false after the last one.
   bool NextRow();
   // A cell of the row; valid until the next call of NextRow.
   std::string_view Cell(std::size_t column) const { return cells_[column]; }
-  // The finite decimal number in a cell; fails if there is none.
+  // The finite decimal number in a cell; fails if the cell holds anything else.
   double Number(std::size_t column) const;
-  // The same, or NaN where the cell is empty or says nan.
+  // The same, but NaN if the cell is empty or holds "nan".
   double NumberOrNan(std::size_t column) const;
 
-  // Throws IoError "name:line: what" for the row, or the names of the columns, that was read last.
+  // Throws IoError "name:line: what" for the line that was read last.
   [[noreturn]] void Fail(std::string_view what) const;
 
  private:
@@ -55,20 +56,20 @@ class CsvReader {
   std::string_view rest_;
   std::string name_;
   CsvDialect dialect_;
-  int line_ = 0;       // of the row that was read last
-  int next_line_ = 1;  // of what is left
+  int line_ = 0;       // line of the last row read
+  int next_line_ = 1;  // line where rest_ begins
   std::vector<std::string> columns_;
   std::vector<std::string_view> cells_;
-  std::deque<std::string> unquoted_;  // cells whose quotes were taken off
+  std::deque<std::string> unquoted_;  // cells without their quotes
 };
 
-// Writes a table. Texts are quoted where they must be. Numbers have the fewest digits that read
-// back to the same bits; one that is not finite, or not there, is an empty cell.
+// Writes a table. Texts are quoted if necessary. Numbers have the fewest digits that read back to
+// the same bits. A missing number, or one that is not finite, becomes an empty cell.
 class CsvWriter {
  public:
   explicit CsvWriter(const std::vector<std::string>& columns);
 
-  // One row, or the beginning of one that further calls of Add continue.
+  // Adds cells to the current row.
   template <class... Cells>
   CsvWriter& Add(const Cells&... cells) {
     (AddCell(cells), ...);
@@ -77,7 +78,7 @@ class CsvWriter {
   // Ends the row, which must have a cell for each column.
   void EndRow();
 
-  // One whole row.
+  // Writes one whole row.
   template <class... Cells>
   void Row(const Cells&... cells) {
     Add(cells...);
@@ -107,7 +108,7 @@ class CsvWriter {
 
   std::string text_;
   std::size_t columns_ = 0;
-  std::size_t cells_ = 0;  // of the row so far
+  std::size_t cells_ = 0;  // cells in the row so far
 };
 
 }  // namespace semblance

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The three ways in which a caller can be wrong, and a request to stop. Numerical outcomes are
-// fields of results, not exceptions.
+// The exceptions: three kinds of wrong input, lack of memory, and a request to stop. A numerical
+// outcome is a field of a result, not an exception.
 #pragma once
 
 #include <stdexcept>
@@ -8,20 +8,20 @@
 
 namespace semblance {
 
-// Base of all errors that a user can correct. The message says where, what, what is allowed, and
-// what to do.
+// Base of all errors that a user can correct. The message states the place, the fault, what is
+// allowed, and the remedy.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-// Data that cannot be used: a bad mesh, a NaN, a missing landmark.
+// Unusable data: a bad mesh, a NaN, a missing landmark.
 class InputError : public Error {
  public:
   using Error::Error;
 };
 
-// A configuration that cannot be used; the message may hold several lines, one per error.
+// An unusable configuration. The message may hold several lines, one per error.
 class ConfigError : public Error {
  public:
   using Error::Error;
@@ -29,6 +29,12 @@ class ConfigError : public Error {
 
 // A file that cannot be read or written.
 class IoError : public Error {
+ public:
+  using Error::Error;
+};
+
+// Too little memory for the work. The message suggests a smaller request.
+class OutOfMemory : public Error {
  public:
   using Error::Error;
 };

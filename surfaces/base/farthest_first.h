@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A few of many points that lie far apart.
+// Chooses a few points that lie far apart.
 #pragma once
 
 #include <cstddef>
@@ -10,12 +10,12 @@
 
 namespace semblance {
 
-// Whether points that lie on others are taken at the end or never.
+// Treatment of points that coincide with chosen ones: chosen last, or never.
 enum class Coincident { kTaken, kLeftOut };
 
-// Indices of `count` points (of all, if there are no more): `first`, then always the one that is
-// farthest from those before it (Gonzalez 1985); of equally far ones the first. Each index stands
-// there once. Costs count times the number of points.
+// Returns the indices of `count` points, or of all if there are fewer. It begins with `first`, and
+// then adds the point farthest from all chosen ones (Gonzalez 1985); on a tie, the lowest index. No
+// index is repeated. Takes time count * points.size().
 std::vector<std::size_t> FarthestFirst(std::span<const Vec3> points, std::size_t first,
                                        std::size_t count,
                                        Coincident coincident = Coincident::kTaken);

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The vectors and the few solids that every floor uses. All lengths in mm. World frame LPS: +x
-// subject left, +y posterior, +z up.
+// Vectors, simple solids and formulas of geometry for all layers. All lengths are in mm. The world
+// frame is LPS: +x points to the subject's left, +y backwards, +z up.
 #pragma once
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <limits>
 
 namespace semblance {
@@ -16,8 +17,8 @@ using Box3 = Eigen::AlignedBox3d;
 
 inline constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-// p -> scale * rotation * p + translation. Named like `face_from_template`: face_from_template *
-// p_in_template is in face.
+// The map p -> scale * rotation * p + translation. Variables are named after their frames:
+// face_from_template * p_in_template is a point in the frame of the face.
 struct Similarity {
   double scale = 1;                  // > 0
   Mat3 rotation = Mat3::Identity();  // proper rotation
@@ -32,5 +33,21 @@ struct Sphere {
 
   bool Contains(const Vec3& p) const { return (p - center).squaredNorm() <= radius_mm * radius_mm; }
 };
+
+// Returns 0 for x <= 0, 1 for x >= 1, and 3 x^2 - 2 x^3 between, with a continuous slope.
+inline double SmoothStep(double x) {
+  const double t = std::clamp(x, 0.0, 1.0);
+  return t * t * (3 - 2 * t);
+}
+
+// Distance from p to the segment ab, in mm, for Vec2 or Vec3. The ends may coincide.
+template <class Vec>
+double DistanceToSegment(const Vec& p, const Vec& a, const Vec& b) {
+  const Vec ab = b - a;
+  const double squared_length = ab.squaredNorm();
+  const double t =
+      squared_length > 0 ? std::clamp((p - a).dot(ab) / squared_length, 0.0, 1.0) : 0.0;
+  return (p - a - t * ab).norm();
+}
 
 }  // namespace semblance

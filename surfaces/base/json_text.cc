@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -12,19 +13,19 @@
 namespace semblance {
 namespace {
 
-// For each new entry of an object the library looks at all others.
-constexpr int kMostEntries = 4000;
+// The library compares each new entry of an object with all others, which takes quadratic time.
+constexpr int kMaxEntries = 4000;
 
 }  // namespace
 
-// Brackets and colons outside of texts, counted before the parser builds a tree of them.
+// Counts brackets and colons outside of texts, before the parser builds a tree.
 void CheckJsonDepth(std::string_view text) {
-  std::vector<int> entries = {0};  // of each list and object that is open
+  std::vector<int> entries = {0};  // count per open list or object
   bool is_in_text = false;
   for (std::size_t k = 0; k < text.size(); ++k) {
     const char c = text[k];
     if (is_in_text) {
-      k += c == '\\' ? 1 : 0;  // what is escaped ends nothing
+      k += c == '\\' ? 1 : 0;  // an escaped quote does not end the text
       is_in_text = c != '"';
     } else if (c == '"') {
       is_in_text = true;
@@ -39,8 +40,8 @@ void CheckJsonDepth(std::string_view text) {
       throw IoError(
           fmt::format("more than {} levels of lists and objects within each other", kDeepestJson));
     }
-    if (entries.back() > kMostEntries) {
-      throw IoError(fmt::format("an object of more than {} entries", kMostEntries));
+    if (entries.back() > kMaxEntries) {
+      throw IoError(fmt::format("an object of more than {} entries", kMaxEntries));
     }
   }
 }
@@ -52,7 +53,7 @@ std::string JsonFault(const std::exception& error) {
 }
 
 nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name) {
-  // The library takes one for the end, and reads nothing behind it.
+  // The library takes a zero byte for the end of the text and ignores the rest.
   if (const std::size_t zero = text.find('\0'); zero != text.npos) {
     throw IoError(fmt::format("{}: this is not JSON: byte {} is zero", name, zero + 1));
   }
@@ -67,3 +68,79 @@ nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name) {
 }
 
 }  // namespace semblance
+
+namespace semblance::json_parts {
+namespace {
+
+double DoubleFromJson(const Json& number) {
+  if (!number.is_number()) {
+    throw IoError(fmt::format("{} is not a number", number.dump()));
+  }
+  return number.get<double>();
+}
+
+}  // namespace
+
+Json ParseWithoutRepeats(std::string_view text) {
+  std::set<std::string> seen;
+  CheckJsonDepth(text);
+  return Json::parse(text, [&seen](int depth, Json::parse_event_t event, Json& parsed) {
+    if (event == Json::parse_event_t::key && depth == 1 &&
+        !seen.insert(parsed.get<std::string>()).second) {
+      throw IoError(fmt::format("entry '{}' appears twice", parsed.get<std::string>()));
+    }
+    return true;  // keep it
+  });
+}
+
+void RequireKeys(const Json& json, const std::set<std::string>& wanted) {
+  if (!json.is_object()) {
+    throw IoError("the top is not an object");
+  }
+  for (const auto& [key, value] : json.items()) {
+    if (!wanted.contains(key)) {
+      throw IoError(fmt::format("unknown entry '{}'; known are {}", key, fmt::join(wanted, ", ")));
+    }
+  }
+  for (const std::string& key : wanted) {
+    if (!json.contains(key)) {
+      throw IoError(fmt::format("entry '{}' is missing", key));
+    }
+  }
+}
+
+void RequireFormat(const Json& json, std::string_view format, int version) {
+  if (json.at("format") != format || json.at("version") != version || json.at("units") != "mm") {
+    throw IoError(fmt::format("it is {} version {} in {}; only {} version {} in mm can be read",
+                              json.at("format").dump(), json.at("version").dump(),
+                              json.at("units").dump(), format, version));
+  }
+}
+
+void RequireSize(const Json& row, std::size_t size) {
+  if (!row.is_array() || row.size() != size) {
+    throw IoError(fmt::format("{} is not a list of {} numbers", row.dump(), size));
+  }
+}
+
+int IntFromJson(const Json& number) {
+  constexpr int kMaxInt = 1'000'000;  // far above every allowed value, and safe in products
+  if (!number.is_number_integer() || number < -kMaxInt || number > kMaxInt) {
+    throw IoError(fmt::format("{} is not a whole number of a sensible size", number.dump()));
+  }
+  return number.get<int>();
+}
+
+const Json& ListFromJson(const Json& json, const char* key) {
+  if (!json.at(key).is_array()) {
+    throw IoError(fmt::format("'{}' is not a list", key));
+  }
+  return json.at(key);
+}
+
+Vec3 VecFromJson(const Json& row, std::size_t first) {
+  return {DoubleFromJson(row.at(first)), DoubleFromJson(row.at(first + 1)),
+          DoubleFromJson(row.at(first + 2))};
+}
+
+}  // namespace semblance::json_parts

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For words of files and options, in which case does not count.
+// Lower case, for file endings and option names that ignore case.
 #pragma once
 
 #include <algorithm>
@@ -8,7 +8,7 @@
 
 namespace semblance {
 
-// Letters of ASCII in lower case, all other bytes as they are.
+// Changes ASCII letters to lower case and leaves all other bytes unchanged.
 inline std::string LowerCase(std::string text) {
   std::ranges::transform(text, text.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

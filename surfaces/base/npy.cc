@@ -52,8 +52,9 @@ NpyHeader SplitHeader(std::string_view bytes, std::string_view name) {
   return {bytes.substr(begin, length), bytes.substr(begin + length)};
 }
 
-// What stands behind 'key': in the dictionary, up to its end.
-std::string_view ValueOf(std::string_view header, std::string_view key, std::string_view name) {
+// Returns the header's text from behind 'key': to its end.
+std::string_view TextAfterKey(std::string_view header, std::string_view key,
+                              std::string_view name) {
   const std::size_t at = header.find(fmt::format("'{}':", key));
   if (at == std::string_view::npos) {
     Fail(name, fmt::format("the header has no '{}'; save the array with numpy.save", key));
@@ -63,8 +64,8 @@ std::string_view ValueOf(std::string_view header, std::string_view key, std::str
   return rest;
 }
 
-std::vector<std::size_t> ShapeOf(std::string_view header, std::string_view name) {
-  const std::string_view text = ValueOf(header, "shape", name);
+std::vector<std::size_t> ParseShape(std::string_view header, std::string_view name) {
+  const std::string_view text = TextAfterKey(header, "shape", name);
   const std::size_t end = text.find(')');
   std::vector<std::size_t> shape;
   for (std::size_t at = 1; text.starts_with('(') && end != std::string_view::npos && at < end;) {
@@ -86,9 +87,9 @@ std::vector<std::size_t> ShapeOf(std::string_view header, std::string_view name)
   return shape;
 }
 
-// The product of the extents; that they fit the bytes also keeps it from overflowing.
-std::size_t CountOf(const std::vector<std::size_t>& shape, std::size_t bytes, std::size_t size,
-                    std::string_view name) {
+// Returns the product of the extents and checks it against the number of bytes, without overflow.
+std::size_t CountValues(const std::vector<std::size_t>& shape, std::size_t bytes, std::size_t size,
+                        std::string_view name) {
   std::size_t count = 1;
   for (const std::size_t extent : shape) {
     if (extent != 0 && count > std::numeric_limits<std::size_t>::max() / extent / size) {
@@ -104,9 +105,9 @@ std::size_t CountOf(const std::vector<std::size_t>& shape, std::size_t bytes, st
 }
 
 template <class Number>
-std::vector<double> ValuesOf(std::string_view data, const std::vector<std::size_t>& shape,
-                             std::string_view name) {
-  std::vector<double> values(CountOf(shape, data.size(), sizeof(Number), name));
+std::vector<double> ReadValues(std::string_view data, const std::vector<std::size_t>& shape,
+                               std::string_view name) {
+  std::vector<double> values(CountValues(shape, data.size(), sizeof(Number), name));
   for (std::size_t k = 0; k < values.size(); ++k) {
     Number number;
     std::memcpy(&number, data.data() + k * sizeof(Number), sizeof(Number));
@@ -118,15 +119,15 @@ std::vector<double> ValuesOf(std::string_view data, const std::vector<std::size_
   return values;
 }
 
-std::vector<double> ValuesOf(std::string_view type, std::string_view data,
-                             const std::vector<std::size_t>& shape, std::string_view name) {
+std::vector<double> ReadValues(std::string_view type, std::string_view data,
+                               const std::vector<std::size_t>& shape, std::string_view name) {
   using Read =
       std::vector<double> (*)(std::string_view, const std::vector<std::size_t>&, std::string_view);
   constexpr std::pair<std::string_view, Read> kTypes[] = {
-      {"<f8", &ValuesOf<double>},       {"<f4", &ValuesOf<float>},
-      {"<i8", &ValuesOf<std::int64_t>}, {"<i4", &ValuesOf<std::int32_t>},
-      {"<i2", &ValuesOf<std::int16_t>}, {"|i1", &ValuesOf<std::int8_t>},
-      {"|u1", &ValuesOf<std::uint8_t>}};
+      {"<f8", &ReadValues<double>},       {"<f4", &ReadValues<float>},
+      {"<i8", &ReadValues<std::int64_t>}, {"<i4", &ReadValues<std::int32_t>},
+      {"<i2", &ReadValues<std::int16_t>}, {"|i1", &ReadValues<std::int8_t>},
+      {"|u1", &ReadValues<std::uint8_t>}};
   for (const auto& [code, read] : kTypes) {
     if (type == code) {
       return read(data, shape, name);
@@ -138,7 +139,7 @@ std::vector<double> ValuesOf(std::string_view type, std::string_view data,
                    type));
 }
 
-// From Fortran's order, the first index fastest.
+// Reorders values from Fortran's order, in which the first index varies fastest.
 std::vector<double> WithLastIndexFastest(const std::vector<double>& values,
                                          const std::vector<std::size_t>& shape) {
   std::vector<double> result(values.size());
@@ -160,11 +161,11 @@ std::vector<double> WithLastIndexFastest(const std::vector<double>& values,
 
 NpyArray ParseNpy(std::string_view bytes, std::string_view name) {
   const NpyHeader header = SplitHeader(bytes, name);
-  std::string_view type = ValueOf(header.text, "descr", name);
+  std::string_view type = TextAfterKey(header.text, "descr", name);
   type = type.starts_with('\'') ? type.substr(1, type.find('\'', 1) - 1) : "of several fields";
-  NpyArray array{.shape = ShapeOf(header.text, name), .values = {}};
-  array.values = ValuesOf(type, header.data, array.shape, name);
-  if (ValueOf(header.text, "fortran_order", name).starts_with("True")) {
+  NpyArray array{.shape = ParseShape(header.text, name), .values = {}};
+  array.values = ReadValues(type, header.data, array.shape, name);
+  if (TextAfterKey(header.text, "fortran_order", name).starts_with("True")) {
     array.values = WithLastIndexFastest(array.values, array.shape);
   }
   return array;

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Arrays in NumPy's .npy files (numpy.lib.format, versions 1 to 3): numbers alone, no pickled
-// objects.
+// Reads arrays of numbers from NumPy's .npy files (numpy.lib.format, versions 1 to 3).
 #pragma once
 
 #include <cstddef>
@@ -12,16 +11,16 @@ namespace semblance {
 
 struct NpyArray {
   std::vector<std::size_t> shape;
-  std::vector<double> values;  // as many as the product of shape, the last index fastest
+  std::vector<double> values;  // last index fastest; the count is the product of shape
 };
 
-// name: of the file, for messages. Little-endian whole numbers of 1, 2, 4 and 8 bytes and floating
-// numbers of 4 and 8 bytes are read; whole numbers beyond 2^53 are rounded to doubles. Throws
-// InputError "name: what" for what is no .npy file, another kind of number (pickled objects among
-// them), a shape that does not fit the bytes that are there, or a value that is not finite.
+// Reads little-endian integers of 1, 2, 4 and 8 bytes and floating-point numbers of 4 and 8 bytes.
+// Integers beyond 2^53 are rounded to doubles. name: the file's name, for messages. Throws
+// InputError "name: fault" for bytes that are not a .npy file, other types (also pickled objects),
+// a shape that does not fit the size of the data, or a value that is not finite.
 NpyArray ParseNpy(std::string_view bytes, std::string_view name);
 
-// Throws IoError if the file cannot be read, InputError as ParseNpy.
+// Throws IoError if the file cannot be read, and InputError as ParseNpy does.
 NpyArray ReadNpy(const std::filesystem::path& path);
 
 }  // namespace semblance

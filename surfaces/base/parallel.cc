@@ -43,7 +43,7 @@ void ParallelFor(std::size_t count, int threads, std::size_t block,
         helpers.emplace_back(work);
       }
     } catch (const std::system_error&) {
-      // The system gives no more of them: those that are there do the work.
+      // The system grants no more threads. The existing ones do the work.
     }
     work();
   }

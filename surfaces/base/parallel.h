@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The one way to spread work over threads: by index, each index writing only what it owns.
+// Spreads work over threads by index. Each index writes only its own result.
 #pragma once
 
 #include <cstddef>
@@ -7,11 +7,9 @@
 
 namespace semblance {
 
-// Calls body(i) once for each i in [0, count), on up to `threads` threads, in blocks of `block`
-// indices. The body must write only to what belongs to index i, so that the result does not depend
-// on the number of threads. If bodies throw, the exception of the lowest block
-// is rethrown.
-// threads >= 1, block >= 1.
+// Calls body(i) once for each i in [0, count), on up to `threads` threads (>= 1), in blocks of
+// `block` (>= 1) indices. body(i) must write only to data of index i; then the result does not
+// depend on the number of threads. If bodies throw, the exception of the lowest block is rethrown.
 void ParallelFor(std::size_t count, int threads, std::size_t block,
                  const std::function<void(std::size_t)>& body);
 

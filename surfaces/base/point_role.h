@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a dowel, or a point of a fit, stands for.
+// The role of a dowel (a depth marker) or of a point in a fit.
 #pragma once
 
 #include <cstdint>
@@ -7,10 +7,10 @@
 namespace semblance {
 
 enum class PointRole : std::uint8_t {
-  kScattered,  // a measured point among many, without an identity of its own
+  kScattered,  // one of many measured points, without a name
   kLandmark,   // the dowel of a site of the skull
-  kInserted,   // a dowel that someone inserted between the sites (thesis 4.2)
-  kSeed,       // an extra dowel, taken from the implicit face
+  kInserted,   // a dowel that a user inserted between the sites (thesis 4.2)
+  kSeed,       // an extra dowel, sampled from the first (implicit) face
 };
 
 }  // namespace semblance

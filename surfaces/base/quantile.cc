@@ -4,8 +4,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace semblance {
+
+double ArithmeticMean(std::span<const double> values) {
+  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+}
 
 std::vector<WeightedValue> SortedValues(std::span<const double> values,
                                         std::span<const double> weights) {
@@ -26,7 +31,7 @@ double Quantile(std::span<const WeightedValue> sorted, double share) {
   }
   const double wanted = share * all, rounding = 1e-12 * all;
   double below = 0, last = std::numeric_limits<double>::quiet_NaN();
-  bool met = false;  // exactly, up to `last`
+  bool met = false;  // the weight up to `last` equals the share
   for (const auto& [value, weight] : sorted) {
     if (weight > 0) {
       if (met) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Quantiles, by one definition for all figures: medians, percentiles, quartiles and intervals.
+// Mean, median and quantiles, each by one definition for the whole program.
 #pragma once
 
 #include <span>
@@ -7,31 +7,31 @@
 
 namespace semblance {
 
+// Sum in index order, divided by the count; NaN for no values.
+double ArithmeticMean(std::span<const double> values);
+
 struct WeightedValue {
   double value = 0;
   double weight = 1;  // >= 0
 };
 
-// The finite ones of the values, ascending. weights: one per value, or none where all weigh the
-// same.
+// Returns the finite values in ascending order. weights: one per value, or none for equal weights.
 std::vector<WeightedValue> SortedValues(std::span<const double> values,
                                         std::span<const double> weights = {});
 
-// The value that `share` (0..1) of the weight does not exceed: the first of the sorted values up to
-// which there is more than that share, or the mean of this one and the one before it where the
-// share is met exactly between them (to 1e-12 of the weight). Definition 2 of Hyndman & Fan
-// (1996), R's type 2, with weights. So the median of an even number is the mean of the two in the
-// middle, and 0 and 1 give the least and the largest value. It does not interpolate between values,
-// which R's default (type 7) does, because that has no accepted form with weights. NaN without any
-// weight.
+// Quantile of weighted values, definition 2 of Hyndman & Fan (1996), R's type 2. It is the first of
+// the sorted values whose cumulative weight exceeds `share` (0..1) of the total weight. If a
+// value's cumulative weight equals the share (to 1e-12 of the total), the quantile is the mean of
+// that value and the next. Hence the median of an even number of values is the mean of the middle
+// two, and the shares 0 and 1 give the smallest and the largest value. R's default (type 7)
+// interpolates between values, but has no accepted form with weights. NaN if the total weight is 0.
 double Quantile(std::span<const WeightedValue> sorted, double share);
 
-// The same of finite values that weigh the same, in time that grows with their number alone; leaves
-// them in another order.
+// The same for finite values of equal weight, in linear time. Reorders the values.
 double Quantile(std::vector<double>& values, double share);
 
-// The median, or of an even number the upper of the two in the middle: one of the values, so that a
-// bound that is made of it is met by one. values: at least one, none NaN; in another order after.
+// The median, or the upper of the middle two. The result is one of the values, so that a bound
+// computed from it is attained. values: at least one, no NaN. Reorders the values.
 double UpperMedian(std::vector<double>& values);
 
 }  // namespace semblance

@@ -14,8 +14,9 @@
 
 namespace semblance {
 
-// The C++ standard fixes the bits of the 64-bit Mersenne Twister, but not what its distributions
-// make of them; so the draws are made here. Each comment says how many times 64 bits a draw takes.
+// The C++ standard fixes the bits of the 64-bit Mersenne Twister, but not the results of its
+// distributions. Hence the draws are computed here. Each comment ends with the number of 64-bit
+// words that a draw consumes.
 class Random {
  public:
   explicit Random(std::uint64_t random_seed) : engine_(random_seed) {}
@@ -38,8 +39,8 @@ class Random {
     const double r = std::sqrt(-2 * std::log(1 - Uniform()));
     return r * std::cos(2 * std::numbers::pi * Uniform());
   }
-  // About normal, mean 0, variance 1, but never beyond 6: the sum of twelve uniform draws, less 6.
-  // Twelve.
+  // Nearly normal with mean 0 and variance 1, within -6..6: the sum of twelve uniform draws minus
+  // 6. Twelve.
   double BoundedNormal() {
     double sum = -6;
     for (int i = 0; i < 12; ++i) {
@@ -55,7 +56,7 @@ class Random {
     return {s * std::cos(azimuth), s * std::sin(azimuth), z};
   }
 
-  // Puts the values into random order (Fisher & Yates). One per value but the first.
+  // Shuffles the values (Fisher & Yates). One per value except the first.
   template <class Value>
   void Shuffle(std::vector<Value>& values) {
     for (std::size_t k = values.size(); k > 1; --k) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How a long step reports its progress and learns that it should stop.
+// Progress reports and cancellation for long steps.
 #pragma once
 
 #include <functional>
@@ -13,10 +13,9 @@
 namespace semblance {
 
 struct Event {
-  std::string step;     // e.g. "polygonize"
-  std::string message;  // one line for people, may be empty
-  double fraction =
-      std::numeric_limits<double>::quiet_NaN();  // done, 0..1; NaN where it is not known
+  std::string step;                                            // e.g. "polygonize"
+  std::string message;                                         // one line for people, may be empty
+  double fraction = std::numeric_limits<double>::quiet_NaN();  // done, 0..1; NaN if unknown
 };
 
 struct RunContext {

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Four or eight numbers in one register. Files that use more than one number at once have compiler
-// options of their own (CMakeLists.txt).
+// Computes with four or eight numbers in one register. Files that use this header have their own
+// compiler options (see CMakeLists.txt).
 #pragma once
 
 #include <array>
 #include <cmath>
 #include <cstring>
 
-// Code for newer processors beside the plain one, chosen when the program starts. All round alike:
-// nothing is contracted (-ffp-contract=off). SEMBLANCE_WIDEST_BITS, a build option, leaves the
-// widest out, for the proof of it (make same-bytes). Under a sanitizer the choice would run before
-// the sanitizer does.
+// Compiles functions also for newer processors and chooses a version when the program starts. All
+// versions give the same bits, because no operations are contracted (-ffp-contract=off). The build
+// option SEMBLANCE_WIDEST_BITS leaves out the widest version, so that a test can compare the bits
+// (make same-bytes). Sanitizers switch this off, because the choice would run before the sanitizer
+// starts.
 #ifndef SEMBLANCE_WIDEST_BITS
 #define SEMBLANCE_WIDEST_BITS 512
 #endif
@@ -36,18 +37,18 @@
 #define SEMBLANCE_WIDE_256
 #endif
 
-// Inlined, so that each clone has it in its own instructions.
+// Forces inlining, so that each version compiles the function for its own instruction set.
 #define SEMBLANCE_INLINE [[gnu::always_inline]] inline
 
 namespace semblance {
 
 using Wide = double __attribute__((vector_size(32)));
-// For sums and products anywhere. What compares belongs in functions for AVX-512 alone
-// (SEMBLANCE_ONLY_512): elsewhere the compiler takes a comparison of eight numbers apart, one by
-// one, and sums of emitters took three times as long as by fours.
+// Suited to sums and products anywhere. Comparisons belong in functions for AVX-512 alone
+// (SEMBLANCE_ONLY_512). Elsewhere the compiler splits a comparison of eight numbers into eight
+// single ones, which made sums of emitters take three times as long as with four numbers.
 using Wider = double __attribute__((vector_size(64)));
 
-// Whether functions for AVX-512 alone may be called.
+// Returns true if functions for AVX-512 alone may be called.
 inline bool HasAvx512() {
 #if SEMBLANCE_CLONED_BITS >= 512
   return __builtin_cpu_supports("avx512f") != 0;
@@ -56,7 +57,7 @@ inline bool HasAvx512() {
 #endif
 }
 
-// What follows is for N = Wider, Wide or double, and gives the same bits for both.
+// The following templates take N = Wider, Wide or double and give the same bits for each.
 template <class N>
 inline constexpr int kLaneCount = sizeof(N) / sizeof(double);
 
@@ -100,9 +101,9 @@ SEMBLANCE_INLINE N SquareRoot(const N& a) {
   return n;
 }
 
-// square^(-power / 2); whole: the power if it is whole, else -1.
+// Returns square^(-power / 2). whole: the power if it is an integer, else -1.
 template <class N>
-SEMBLANCE_INLINE N InversePowerOf(const N& square, double power, int whole) {
+SEMBLANCE_INLINE N InversePowerFromSquare(const N& square, double power, int whole) {
   if (whole < 0) {
     double result[kLaneCount<N>];
     std::memcpy(result, &square, sizeof(square));

@@ -39,8 +39,8 @@ void CheckPoints(std::span<const Vec3> from, std::span<const Vec3> to,
   }
 }
 
-// Space as seen from the middle of the points, in units of their mean spread, which keeps the
-// equations well conditioned.
+// Moves the points' mean to the origin and their mean spread to 1, which keeps the equations well
+// conditioned.
 struct Centred {
   Vec3 middle = Vec3::Zero();
   double spread_mm = 1;
@@ -66,7 +66,7 @@ Rows3 AsRows(std::span<const Vec3> points) {
   return rows;
 }
 
-// -|x_i - x_j|, with the misfit's share on the diagonal.
+// The matrix -|x_i - x_j|, plus the misfit terms on the diagonal.
 MatrixXd Kernel(const Rows3& x, const Eigen::VectorXd& diagonal) {
   MatrixXd kernel(x.rows(), x.rows());
   for (Eigen::Index j = 0; j < x.rows(); ++j) {
@@ -76,13 +76,13 @@ MatrixXd Kernel(const Rows3& x, const Eigen::VectorXd& diagonal) {
   return kernel;
 }
 
-// Of c in kernel * c + affine_columns * a = y with c orthogonal to the affine columns.
+// The solution of kernel * c + affine_columns * a = y with c orthogonal to the affine columns.
 struct Coefficients {
   Rows3 c;
   Eigen::Matrix<double, 4, 3> a;
 };
 
-// On the space orthogonal to all affine functions the kernel is positive definite.
+// Solves on the space orthogonal to all affine functions, where the kernel is positive definite.
 Coefficients Solve(const MatrixXd& kernel, const MatrixXd& affine_columns, const Rows3& y) {
   const Eigen::HouseholderQR<MatrixXd> qr(affine_columns);
   const MatrixXd q = qr.householderQ();

@@ -10,12 +10,12 @@
 namespace semblance {
 namespace {
 
-// Some lanes, from `first` on, seen from a point: over the plane, and where they emit from.
+// A point relative to the lanes from `first` on.
 template <class N>
 struct Seen {
-  N z{};
-  N beside2{};  // squared distance in the plane to the triangle's border
-  N within{};   // >= 0 over the triangle
+  N z{};        // height over the plane of emission
+  N beside2{};  // squared distance within the plane to the triangle's border
+  N within{};   // >= 0 if the foot lies in the triangle
 };
 
 template <class N>
@@ -45,10 +45,10 @@ template <class N>
 SEMBLANCE_INLINE N Emit(const DistanceEmitterLanes& b, int first, const Vec3& p,
                         const Falloff& falloff, int whole) {
   const Seen<N> seen = See<N>(b, first, p);
-  const N nothing{}, most = All<N>(kMostEmission);
+  const N nothing{}, most = All<N>(kMaxEmission);
   const N beside2 = seen.within >= 0 ? nothing : seen.beside2;
   const N square = Greater<N>(seen.z * seen.z + beside2, Load<N>(b.floor_mm2, first));
-  const N falling = Load<N>(b.gain, first) * InversePowerOf(square, falloff.power, whole);
+  const N falling = Load<N>(b.gain, first) * InversePowerFromSquare(square, falloff.power, whole);
   const N beyond = falling < falloff.cut ? nothing : Smaller(falling, most);
   const N solid = seen.within >= 0 ? most : nothing;
   const N either = seen.z < 0 ? solid : beyond;
@@ -56,11 +56,11 @@ SEMBLANCE_INLINE N Emit(const DistanceEmitterLanes& b, int first, const Vec3& p,
 }
 
 constexpr int kHalf = DistanceEmitterLanes::kLanes / 2;
-// How many of N's registers the lanes of a batch fill.
+// Number of registers of type N per batch of lanes.
 template <class N>
 constexpr unsigned kParts = DistanceEmitterLanes::kLanes / kLaneCount<N>;
 
-// Which of eight balls reach p: -1, and 0 for those that do not.
+// Returns -1 for each of eight balls that contains p, and 0 for the others.
 template <class N>
 SEMBLANCE_INLINE std::array<std::int64_t, DistanceEmitterLanes::kLanes> Reaching(
     const ReachLanes& reaches, const Vec3& p) {
@@ -85,9 +85,9 @@ struct Summands {
   const Falloff& falloff;
 };
 
-// Appends to `found` the parts of at most four batches that reach p: those of batch b are from
-// kParts b on. Without a branch that could be guessed wrong; writes one more than it appends. Adds
-// to `halves` how many reach p.
+// Appends to `found` the parts of at most four batches that reach p; batch b has the parts from
+// kParts * b on. Adds to `halves` the number of balls that reach p. The code has no branches, which
+// the processor could mispredict, and therefore writes one entry more than it appends.
 template <class N>
 SEMBLANCE_INLINE std::uint32_t* AppendReaching(std::span<const std::int32_t> which,
                                                const ReachLanes& reaches, const Vec3& p,
@@ -109,10 +109,10 @@ SEMBLANCE_INLINE std::uint32_t* AppendReaching(std::span<const std::int32_t> whi
   return found;
 }
 
-// whole: the falloff's, known when this is compiled or when it is called.
+// whole: the falloff's power, as a compile-time constant if the caller passes one.
 template <class N>
 SEMBLANCE_INLINE double Sum(const Summands& all, const Vec3& p, int whole, std::int64_t& reaching) {
-  constexpr std::size_t kAtOnce = 32;  // eights of balls
+  constexpr std::size_t kAtOnce = 32;  // groups of eight balls per pass
   std::array<std::uint32_t, 2 * kHalf * kAtOnce + 1> found;
   std::array<N, kParts<N>> sums{};
   std::int64_t halves = 0;
@@ -136,9 +136,10 @@ SEMBLANCE_INLINE double Sum(const Summands& all, const Vec3& p, int whole, std::
 
 template <class N>
 SEMBLANCE_INLINE double Sum(const Summands& all, const Vec3& p, std::int64_t& reaching) {
-  constexpr int kUsual = 6;  // the default decay
-  return all.falloff.whole == kUsual ? Sum<N>(all, p, kUsual, reaching)
-                                     : Sum<N>(all, p, all.falloff.whole, reaching);
+  constexpr int kDefaultPower = 6;  // of the default decay; the constant lets the compiler unroll
+                                    // the power
+  return all.falloff.whole == kDefaultPower ? Sum<N>(all, p, kDefaultPower, reaching)
+                                            : Sum<N>(all, p, all.falloff.whole, reaching);
 }
 
 SEMBLANCE_ONLY_512 double SumByEights(const Summands& all, const Vec3& p, std::int64_t& reaching) {
@@ -148,8 +149,8 @@ SEMBLANCE_WIDE_256 double SumByFours(const Summands& all, const Vec3& p, std::in
   return Sum<Wide>(all, p, reaching);
 }
 
-// The corners of a lane's triangle, where it emits from.
-std::array<Vec3, 3> CornersOf(const DistanceEmitterLanes& batch, int l) {
+// The corners of a lane's triangle at its place of emission.
+std::array<Vec3, 3> LaneCorners(const DistanceEmitterLanes& batch, int l) {
   const auto at = [l](const std::array<DistanceEmitterLanes::Lanes, 3>& lanes) {
     return Vec3(lanes[0][l], lanes[1][l], lanes[2][l]);
   };
@@ -158,13 +159,13 @@ std::array<Vec3, 3> CornersOf(const DistanceEmitterLanes& batch, int l) {
           a + batch.ac.length[l] * (batch.ac.x[l] * x + batch.ac.y[l] * y)};
 }
 
-// Of four lanes, from `first` on.
-ReachBall ReachBallOf(const DistanceEmitterLanes& batch, int first, const Falloff& falloff) {
+// The ball around four lanes, from `first` on.
+ReachBall MakeReachBall(const DistanceEmitterLanes& batch, int first, const Falloff& falloff) {
   constexpr double kSlack = 1 + 1e-9;
-  int end = first;  // of the lanes that are set
+  int end = first;  // end of the lanes that are set
   Box3 box;
   for (; end < first + kHalf && batch.gain[end] > 0; ++end) {
-    for (const Vec3& corner : CornersOf(batch, end)) {
+    for (const Vec3& corner : LaneCorners(batch, end)) {
       box.extend(corner);
     }
   }
@@ -176,7 +177,7 @@ ReachBall ReachBallOf(const DistanceEmitterLanes& batch, int first, const Fallof
   for (int l = first; l < end; ++l) {
     const double emitting_mm = std::pow(batch.gain[l] / falloff.cut, 1 / falloff.power);
     const double solid_mm = batch.advance_mm[l];
-    for (const Vec3& corner : CornersOf(batch, l)) {
+    for (const Vec3& corner : LaneCorners(batch, l)) {
       radius_mm = std::max(radius_mm, (corner - center).norm() + std::max(emitting_mm, solid_mm));
     }
   }
@@ -213,10 +214,10 @@ void DistanceEmitterLanes::Set(int lane, const Vec3& a, const Vec3& b, const Vec
 double DistanceKernel::AtDistance(const EmitterTriangle& t, double distance) const {
   const double floored2 = std::max(distance * distance, t.Floor2(1 - split_));
   const double emission = t.gain * falloff_.InversePower(floored2);
-  return emission < falloff_.cut ? 0 : std::min(emission, kMostEmission);
+  return emission < falloff_.cut ? 0 : std::min(emission, kMaxEmission);
 }
 
-std::vector<DistanceEmitterLanes> DistanceKernel::LanesOf(
+std::vector<DistanceEmitterLanes> DistanceKernel::MakeLanes(
     std::span<const EmitterTriangle> emitters) const {
   constexpr std::size_t kLanes = DistanceEmitterLanes::kLanes;
   std::vector<DistanceEmitterLanes> lanes((emitters.size() + kLanes - 1) / kLanes);
@@ -228,13 +229,13 @@ std::vector<DistanceEmitterLanes> DistanceKernel::LanesOf(
   return lanes;
 }
 
-std::vector<ReachBall> ReachBallsOf(std::span<const DistanceEmitterLanes> batches,
-                                    const Falloff& falloff) {
+std::vector<ReachBall> MakeReachBalls(std::span<const DistanceEmitterLanes> batches,
+                                      const Falloff& falloff) {
   std::vector<ReachBall> reaches;
   reaches.reserve(2 * batches.size());
   for (const DistanceEmitterLanes& batch : batches) {
-    reaches.push_back(ReachBallOf(batch, 0, falloff));
-    reaches.push_back(ReachBallOf(batch, kHalf, falloff));
+    reaches.push_back(MakeReachBall(batch, 0, falloff));
+    reaches.push_back(MakeReachBall(batch, kHalf, falloff));
   }
   return reaches;
 }

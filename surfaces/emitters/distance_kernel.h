@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The emitters of the thesis (eq. 3.1 and 3.2, emitter.h), eight triangles at once.
+// Evaluates the thesis's emitters (eq. 3.1 and 3.2, emitter.h) for eight triangles at once.
 #pragma once
 
 #include <array>
@@ -13,20 +13,20 @@
 
 namespace semblance {
 
-// Triangles side by side, one per lane, each in the plane of where it emits from: first corner at
-// the origin, second on the x axis, third above it. A lane that was not set emits nothing. A lane
-// alone gives the same bits as all of them.
+// Eight triangles, one per lane, each in the plane from which it emits: the first corner at the
+// origin, the second on the x axis, the third at y > 0. A lane that was not set emits nothing. One
+// lane alone gives the same bits as all lanes together.
 struct alignas(64) DistanceEmitterLanes {
   static constexpr int kLanes = 8;
   using Lanes = std::array<double, kLanes>;
   struct Edge {
-    Lanes x{}, y{}, length{};  // unit direction, mm
+    Lanes x{}, y{}, length{};  // unit direction; length in mm
   };
 
   DistanceEmitterLanes() { floor_mm2.fill(1); }
 
-  // The triangle emits from where it is moved by advance_mm along its normal, and is solid on the
-  // way there; distances below floor_mm count as that.
+  // Stores a triangle that emits from its position moved by `advance` (mm) along its normal and is
+  // solid on the way. Distances below `floor` (mm) count as `floor`.
   void Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& unit_normal,
            double advance, double floor, double lane_gain);
 
@@ -35,10 +35,10 @@ struct alignas(64) DistanceEmitterLanes {
   Lanes advance_mm{}, floor_mm2{}, gain{};
 };
 
-// The emitter of eq. 3.2; that of eq. 3.1 is the same with a split of 0.
+// The emitter of eq. 3.2. A split of 0 gives the emitter of eq. 3.1.
 class DistanceKernel {
  public:
-  // How many emitters are summed or left out together.
+  // Number of emitters that are summed or left out together.
   static constexpr int kRun = DistanceEmitterLanes::kLanes;
 
   explicit DistanceKernel(const ThesisEmitter& o) : DistanceKernel(o.decay, 0, o.cut_below) {}
@@ -50,11 +50,11 @@ class DistanceKernel {
   double EmittingDepth(const EmitterTriangle& t) const { return (1 - split_) * t.depth_mm; }
   double Gain(const EmitterTriangle& t) const { return std::pow(EmittingDepth(t), Decay()); }
   double Floor(const EmitterTriangle& t) const { return std::sqrt(t.Floor2(1 - split_)); }
-  // In front of the moved triangle, at a distance from it.
+  // The emission in front of the moved triangle, at a distance from it.
   double AtDistance(const EmitterTriangle& t, double distance) const;
 
-  // Of each eight emitters, in their order.
-  std::vector<DistanceEmitterLanes> LanesOf(std::span<const EmitterTriangle> emitters) const;
+  // Groups the emitters by eight, in their order.
+  std::vector<DistanceEmitterLanes> MakeLanes(std::span<const EmitterTriangle> emitters) const;
 
  private:
   DistanceKernel(double decay, double split, double cut)
@@ -64,32 +64,32 @@ class DistanceKernel {
   Falloff falloff_;
 };
 
-// A ball around four triangles, half of the lanes, beyond which the cut leaves nothing of what they
-// emit.
+// A ball around the four triangles of half the lanes. Beyond the ball their emissions fall below
+// the cut.
 struct ReachBall {
   Vec3 center = Vec3::Zero();
-  double squared_mm2 = -1;  // of its radius; infinite without a cut
+  double squared_mm2 = -1;  // squared radius; infinite without a cut
 };
-// Two for each eight lanes.
-std::vector<ReachBall> ReachBallsOf(std::span<const DistanceEmitterLanes> lanes,
-                                    const Falloff& falloff);
+// Makes two balls per eight lanes.
+std::vector<ReachBall> MakeReachBalls(std::span<const DistanceEmitterLanes> lanes,
+                                      const Falloff& falloff);
 
-// Eight balls side by side.
+// Eight balls, one per lane.
 struct alignas(64) ReachLanes {
   ReachLanes() { squared_mm2.fill(-1); }
 
   std::array<DistanceEmitterLanes::Lanes, 3> center{};
   DistanceEmitterLanes::Lanes squared_mm2{};
 };
-// Those of some lanes, by their numbers.
+// Gathers the balls of some groups of lanes, given by index.
 std::vector<ReachLanes> Gather(std::span<const ReachBall> balls,
                                std::span<const std::int32_t> which);
 
-// What one lane emits at p: 0 at heights <= 0 over its triangle's plane.
+// The emission of one lane at p; 0 at heights <= 0 over its triangle's plane.
 double EmitByDistance(const DistanceEmitterLanes& lanes, int lane, const Vec3& p,
                       const Falloff& falloff);
-// The sum at p of all lanes of some, by their numbers; reaches: theirs, by Gather. Adds to
-// `reaching` how many emitters were in balls that reach p.
+// The sum at p over some groups of lanes, given by index (`which`) and with their balls (`reaches`,
+// from Gather). Adds to `reaching` the number of emitters in balls that contain p.
 double SumByDistance(std::span<const DistanceEmitterLanes> lanes,
                      std::span<const std::int32_t> which, std::span<const ReachLanes> reaches,
                      const Vec3& p, const Falloff& falloff, std::int64_t& reaching);

@@ -10,14 +10,14 @@
 namespace semblance {
 namespace {
 
-// Squared distance along one axis between [low, high] and all within `half` of the center.
+// Squared distance along one axis between [low, high] and center +- half.
 SEMBLANCE_INLINE Wide SquaredGap(const Wide& low, const Wide& high, double center, double half) {
   const Wide gap = Greater(Greater(low - center, center - high) - half, Wide{});
   return gap * gap;
 }
 
-SEMBLANCE_INLINE Wide MostOf(const EmissionUpperBound& b, int first, const Vec3& center,
-                             const Vec3& half, const Falloff& falloff) {
+SEMBLANCE_INLINE Wide UpperBounds(const EmissionUpperBound& b, int first, const Vec3& center,
+                                  const Vec3& half, const Falloff& falloff) {
   Wide height = -Load<Wide>(b.offset_mm, first), slack = Magnitude(height), from2{}, way2{};
   for (int axis = 0; axis < 3; ++axis) {
     const double at = center[axis], reach = half[axis];
@@ -29,7 +29,8 @@ SEMBLANCE_INLINE Wide MostOf(const EmissionUpperBound& b, int first, const Vec3&
     way2 += SquaredGap(Smaller(low, low - moved), Greater(high, high - moved), at, reach);
   }
   height += kRounding * slack;
-  Wide most = Load<Wide>(b.gain, first) * InversePowerOf(from2, falloff.power, falloff.whole);
+  Wide most =
+      Load<Wide>(b.gain, first) * InversePowerFromSquare(from2, falloff.power, falloff.whole);
   if (falloff.by_height) {
     most *= Smaller(height, SquareRoot(from2));
   }
@@ -38,8 +39,8 @@ SEMBLANCE_INLINE Wide MostOf(const EmissionUpperBound& b, int first, const Vec3&
   return height > 0 ? most : Wide{};
 }
 
-// Not more than the distance of any point of the box from the triangle moved by `shift` along its
-// normal; center_mm: that of the box's center.
+// A lower bound of the distance from the box to the triangle moved by `shift` along its normal.
+// center_mm: the distance of the box's center.
 double LeastDistance(const EmitterTriangle& t, double shift, const BoxView& box, double center_mm) {
   const Vec3 low = t.a.cwiseMin(t.b).cwiseMin(t.c) + shift * t.normal,
              high = t.a.cwiseMax(t.b).cwiseMax(t.c) + shift * t.normal;
@@ -47,7 +48,7 @@ double LeastDistance(const EmitterTriangle& t, double shift, const BoxView& box,
 }
 
 struct HeightRange {
-  double center, least, most;  // over a triangle's plane; exact
+  double center, least, most;  // heights over a triangle's plane; exact
 };
 
 HeightRange HeightsOver(const EmitterTriangle& t, const BoxView& box) {
@@ -57,9 +58,9 @@ HeightRange HeightsOver(const EmitterTriangle& t, const BoxView& box) {
 
 }  // namespace
 
-// In front of the moved triangle emission falls with the distance alone, a convex function, whose
-// greatest value in a box is at a corner. Below it only its prism emits; the least is taken as 0
-// unless the whole box lies beyond it.
+// In front of the moved triangle, emission falls with the distance. The distance is a convex
+// function, so that its largest value in a box, and with it the smallest emission, is at a corner.
+// Behind the moved triangle only the prism emits; there the lower bound is 0.
 EmissionBounds BoundsOn(const DistanceKernel& kernel, const EmitterTriangle& t,
                         const BoxView& box) {
   const HeightRange height = HeightsOver(t, box);
@@ -78,16 +79,16 @@ EmissionBounds BoundsOn(const DistanceKernel& kernel, const EmitterTriangle& t,
   if (shift > 0 && height.least < shift) {
     const double beside2 = SquaredDistance(t, box.center - height.center * t.normal);
     const bool over = ProjectsOnto(t, box.center);
-    bounds.most = over || beside2 <= box.radius_mm * box.radius_mm ? kMostEmission : bounds.most;
+    bounds.most = over || beside2 <= box.radius_mm * box.radius_mm ? kMaxEmission : bounds.most;
   }
   return bounds;
 }
 
-// In front of the triangle the emission is quasi-concave, so that its least value in a box is at a
-// corner: that of a point of it is h R^-m with m = k + 3, and (h R^-m)^(-1/(m-1)) is convex; the
-// integral over the triangle keeps that (Borell 1975, Brascamp & Lieb 1976).
-// At height h and distance R >= max(h, nearest) the integrand is at most h / max(h, nearest)^(k+3),
-// which grows up to h = nearest and falls from there.
+// In front of the triangle the emission is quasi-concave, so that its smallest value in a box is at
+// a corner. A point of the triangle contributes h R^-m with m = k + 3, and (h R^-m)^(-1/(m-1)) is
+// convex; integration over the triangle preserves this (Borell 1975, Brascamp & Lieb 1976). The
+// upper bound: at height h and distance R >= max(h, nearest) the integrand is at most h / max(h,
+// nearest)^(k+3), which grows up to h = nearest and falls beyond.
 EmissionBounds BoundsOn(const FlatKernel& kernel, const EmitterTriangle& t, const BoxView& box) {
   const HeightRange height = HeightsOver(t, box);
   if (height.most <= 0) {
@@ -99,7 +100,7 @@ EmissionBounds BoundsOn(const FlatKernel& kernel, const EmitterTriangle& t, cons
   EmissionBounds bounds;
   bounds.most =
       nearest > 0 ? kernel.Above(t, t.most_share, std::clamp(nearest, above, height.most), nearest)
-                  : kMostEmission;
+                  : kMaxEmission;
   if (above > 0) {
     const double furthest =
         (box.center - t.centroid).norm() + box.radius_mm + std::sqrt(t.longest2_mm2);
@@ -126,7 +127,7 @@ SEMBLANCE_WIDE void UpperBoundInBox(const EmissionUpperBound& lanes, const Vec3&
                                     const Vec3& half, const Falloff& falloff,
                                     EmissionUpperBound::Lanes& most) {
   for (int first = 0; first < EmissionUpperBound::kLanes; first += kLaneCount<Wide>) {
-    Store(MostOf(lanes, first, center, half, falloff), most, first);
+    Store(UpperBounds(lanes, first, center, half, falloff), most, first);
   }
 }
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bounds on what emitters give anywhere in a box: least and most of one (thesis 3.2.3, re-derived:
-// its maximum at the closest point fails behind a tilted plane, its minimum over the corners fails
-// beside a prism), and a quick upper bound of eight at once, for leaving out those too far away.
+// Bounds of emissions in a box: lower and upper bounds of one emitter (thesis 3.2.3), and a quick
+// upper bound of eight emitters at once, used to leave out distant ones. The bounds differ from the
+// thesis's: its maximum at the closest point is wrong behind a tilted plane, and its minimum over
+// the corners is wrong beside a prism.
 #pragma once
 
 #include <array>
@@ -13,7 +14,7 @@
 
 namespace semblance {
 
-// A box, and a ball around it.
+// A box and the ball around it.
 struct BoxView {
   Box3 box;
   Vec3 center, half;
@@ -26,23 +27,23 @@ struct BoxView {
 EmissionBounds BoundsOn(const DistanceKernel& kernel, const EmitterTriangle& t, const BoxView& box);
 EmissionBounds BoundsOn(const FlatKernel& kernel, const EmitterTriangle& t, const BoxView& box);
 
-// Triangles side by side, one per lane, by what bounds their emission.
+// The data that bound the emissions of eight triangles, one per lane.
 struct alignas(64) EmissionUpperBound {
   static constexpr int kLanes = 8;
   using Lanes = std::array<double, kLanes>;
 
   void Set(int lane, const EmitterTriangle& t);
 
-  std::array<Lanes, 3> low{}, high{};  // a box of where it emits from
-  std::array<Lanes, 3> moved{};        // to there
+  std::array<Lanes, 3> low{}, high{};  // box around the place of emission
+  std::array<Lanes, 3> moved{};        // from the triangle to that place
   std::array<Lanes, 3> normal{};
-  Lanes offset_mm{};  // of the plane along the normal
+  Lanes offset_mm{};  // plane: n.x = offset
   Lanes gain{};
 };
 
-// Not less than what each lane emits anywhere within `half`, each way, of the center; infinity
-// where the triangle, or the way along which it was moved, may meet that box. Of no use for lanes
-// that were not set.
+// Writes, per lane, an upper bound of the emission in the box center +- half. It is infinite if the
+// triangle, or its path to the place of emission, may meet the box. Lanes that were not set have no
+// meaning.
 void UpperBoundInBox(const EmissionUpperBound& lanes, const Vec3& center, const Vec3& half,
                      const Falloff& falloff, EmissionUpperBound::Lanes& most);
 

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a triangle of the skull emits (thesis ch. 3): three kinds, chosen by option. For a triangle
-// T with depth l, decay k and a point p at height h over T's plane; every emitter is 0 where h <=
-// 0.
+// The emission e(p) of a triangle of the skull (thesis ch. 3), in three kinds. The face is the
+// surface where the emissions of all triangles sum to 1. In the formulas T is a triangle with
+// tissue depth l (mm), k is the decay, and h is the height of the point p over T's plane. Every
+// emission is 0 for h <= 0.
 #pragma once
 
 #include <array>
@@ -12,43 +13,43 @@
 
 namespace semblance {
 
-// Eq. 3.1: (l / d)^k, d the distance from p to T. The surface of a flat plate lies the further out
-// the finer its mesh.
+// e(p) = (l / d)^k, with d the distance from p to T (thesis eq. 3.1). Over a flat plate the surface
+// lies further out the finer the mesh is.
 struct ThesisEmitter {
   static constexpr std::string_view kName = "thesis";
-  double decay = 6;      // k: more blends less, and follows the bone more
-  double cut_below = 0;  // an emission below this is none; 0: all count
+  double decay = 6;
+  double cut_below = 0;
 };
 
-// Eq. 3.2: T moved out by t l emits with depth (1 - t) l; the prism under it is solid.
+// e(p) = ((1 - t) l / d_t)^k, with d_t the distance from p to T moved out by t l (thesis eq. 3.2).
+// The prism between T and the moved T is solid.
 struct SplitEmitter {
   static constexpr std::string_view kName = "split";
-  double decay = 6;      // k: more blends less, and follows the bone more
-  double split = 0.5;    // t: 0 is the first emitter
-  double cut_below = 0;  // an emission below this is none; 0: all count
+  double decay = 6;
+  double split = 0.5;
+  double cut_below = 0;
 };
 
-// (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the integral
-// is 2 pi h^(-k) / (k+1), so coplanar triangles of one depth sum to (l/h)^k: their surface is flat,
-// at exactly l, whatever the mesh.
-//
-// With the depth linear over T, l^k stands under the integral: no steps where depth changes from
-// triangle to triangle. (The thesis's emitters know one depth per triangle.)
+// The depth over a triangle. With kLinear l^k moves under the integral, which avoids steps where
+// the depth changes from triangle to triangle. (The thesis's emitters have one depth per triangle.)
 enum class EmitterDepth { kMean, kLinear };
 constexpr auto EnumNames(EmitterDepth) {
   return std::to_array<std::string_view>({"mean", "linear"});
 }
 
+// e(p) = (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the
+// integral is 2 pi h^(-k) / (k+1). Hence coplanar triangles of one depth l sum to (l/h)^k, and
+// their surface is flat, at exactly the height l, for any mesh (docs/mathematics.md, 2).
 struct FlatEmitter {
   static constexpr std::string_view kName = "flat";
-  double decay = 6;                          // k: more blends less, and follows the bone more
-  EmitterDepth depth = EmitterDepth::kMean;  // the corners' mean, or linear between them
+  double decay = 6;
+  EmitterDepth depth = EmitterDepth::kMean;
 };
 
-// What an emitter gives in a box: nowhere less than `least`, nowhere more than `most`.
+// Bounds of an emission in a box: least <= e(p) <= most.
 struct EmissionBounds {
   double least = 0, most = 0;
-  // Nowhere in the box does it give less than at one of the corners (within SumShare).
+  // True if the smallest emission in the box occurs at one of its corners (within SumShare).
   bool least_at_corner = false;
 };
 
@@ -66,8 +67,8 @@ inline constexpr FieldInfo kCutBelow{
     .min = 0,
     .max = 0.1,
     .doc =
-        "a triangle emits nothing where it would emit less than this; the thesis's boxes (3.2.2, "
-        "m = 500), but round: 0.002. What is lost adds up where the mesh is dense; 0 cuts nothing"};
+        "emissions below this count as 0; the thesis's boxes (3.2.2, m = 500), but round, are "
+        "0.002. The loss adds up where the mesh is dense; 0 cuts nothing"};
 }  // namespace emitter_internal
 template <class Visitor>
 void Fields(Visitor& visit, ThesisEmitter& o) {
@@ -89,8 +90,8 @@ template <class Visitor>
 void Fields(Visitor& visit, FlatEmitter& o) {
   visit(emitter_internal::kDecay, o.decay);
   visit(FieldInfo{.name = "depth",
-                  .doc = "of a triangle: the mean of its corners' (thesis 3.1), or linear between "
-                         "them"},
+                  .doc = "depth over a triangle: the mean of its corners (thesis 3.1), or linear "
+                         "between them"},
         o.depth);
 }
 

@@ -10,8 +10,8 @@
 namespace semblance {
 namespace {
 
-// Calls visit(x, mass) for points of triangle a, b, c whose moments up to the second are those of
-// the triangle with that mass.
+// Calls visit(x, mass) for four points with the same moments, up to the second, as the triangle
+// abc.
 template <class Visit>
 void ForEachPoint(const Vec3& a, const Vec3& b, const Vec3& c, double mass, const Visit& visit) {
   visit(Vec3((a + b + c) / 3), 0.75 * mass);
@@ -20,7 +20,8 @@ void ForEachPoint(const Vec3& a, const Vec3& b, const Vec3& c, double mass, cons
   }
 }
 
-// The same for an emitter, its gain and depth^decay the mass; by parts where the depth is linear.
+// The same for an emitter with the mass gain * (relative depth)^decay, in four parts if the depth
+// is linear.
 template <class Visit>
 void ForEachPoint(const EmitterTriangle& t, int decay, const Visit& visit) {
   if (!t.IsSloped()) {
@@ -38,7 +39,7 @@ void ForEachPoint(const EmitterTriangle& t, int decay, const Visit& visit) {
   ForEachPoint(ab, bc, ca, t.gain / 4, weighted);
 }
 
-// visit(t, x, mass) for all points of all emitters.
+// Calls visit(t, x, mass) for all points of all emitters.
 template <class Visit>
 void ForEachPoint(std::span<const EmitterTriangle> emitters, int decay, const Visit& visit) {
   for (const EmitterTriangle& t : emitters) {
@@ -46,9 +47,9 @@ void ForEachPoint(std::span<const EmitterTriangle> emitters, int decay, const Vi
   }
 }
 
-// The centroid, each emitter weighted by how much it faces the common normal, moved along that so
-// that the sum of gain n.(x - center) is 0.
-Vec3 CenterOf(std::span<const EmitterTriangle> emitters, int decay, const Vec3& gain_normal) {
+// The centroid, with emitters weighted by n.N, moved along N so that the sum of gain n.(x - center)
+// is 0.
+Vec3 FindCenter(std::span<const EmitterTriangle> emitters, int decay, const Vec3& gain_normal) {
   const double gain = gain_normal.norm();
   const Vec3 normal = gain_normal / gain;
   Vec3 center = Vec3::Zero();
@@ -60,13 +61,13 @@ Vec3 CenterOf(std::span<const EmitterTriangle> emitters, int decay, const Vec3& 
   return center + (along - normal.dot(center)) * normal;
 }
 
-// Moments about the center: [i], of gain n_i.
+// Moments about the center; second[i] is weighted by gain n_i.
 struct Moments {
   Mat3 first = Mat3::Zero();
   std::array<Mat3, 3> second = {Mat3::Zero(), Mat3::Zero(), Mat3::Zero()};
 };
 
-Moments MomentsOf(std::span<const EmitterTriangle> emitters, int decay, const Vec3& center) {
+Moments ComputeMoments(std::span<const EmitterTriangle> emitters, int decay, const Vec3& center) {
   Moments moments;
   ForEachPoint(emitters, decay, [&](const EmitterTriangle& t, const Vec3& x, double mass) {
     const Vec3 y = x - center;
@@ -79,7 +80,7 @@ Moments MomentsOf(std::span<const EmitterTriangle> emitters, int decay, const Ve
   return moments;
 }
 
-// Of the second order, by how much the series is more than gain_normal and spread give.
+// Bounds the part of the second order that gain_normal and spread do not represent.
 double SecondOrderLeft(const Moments& moments, const EmitterMultipole& multipole, int power) {
   double all2 = 0;
   Vec3 traces, cross = Vec3::Zero();
@@ -92,7 +93,7 @@ double SecondOrderLeft(const Moments& moments, const EmitterMultipole& multipole
   return 0.5 * power * (traces.norm() + (power + 2) * std::sqrt(all2)) + power * cross.norm();
 }
 
-// Sets what is bounded by each emitter's furthest corner.
+// Sets the bounds that depend on each emitter's furthest corner.
 void SetBounds(std::span<const EmitterTriangle> emitters, int decay, EmitterMultipole& multipole) {
   multipole.radius_mm = 0;
   for (const EmitterTriangle& t : emitters) {
@@ -116,7 +117,7 @@ void SetBounds(std::span<const EmitterTriangle> emitters, int decay, EmitterMult
 
 }  // namespace
 
-EmitterMultipole MultipoleOf(std::span<const EmitterTriangle> emitters, int decay) {
+EmitterMultipole MakeMultipole(std::span<const EmitterTriangle> emitters, int decay) {
   EmitterMultipole multipole;
   ForEachPoint(emitters, decay, [&](const EmitterTriangle& t, const Vec3&, double mass) {
     multipole.gain_normal += mass * t.normal;
@@ -126,8 +127,8 @@ EmitterMultipole MultipoleOf(std::span<const EmitterTriangle> emitters, int deca
   if (!(facing > 0)) {
     return multipole;
   }
-  multipole.center = CenterOf(emitters, decay, multipole.gain_normal);
-  const Moments moments = MomentsOf(emitters, decay, multipole.center);
+  multipole.center = FindCenter(emitters, decay, multipole.gain_normal);
+  const Moments moments = ComputeMoments(emitters, decay, multipole.center);
   for (int i = 0; i < 3; ++i) {
     multipole.spread_mm2 += multipole.gain_normal[i] / (facing * facing) * moments.second[i];
   }
@@ -167,9 +168,10 @@ void MultipoleLanes::Set(int lane, const EmitterMultipole& multipole, int power)
 }
 
 // The coefficients of |p - x|^-power in powers of |x - center| / |p - center| are Gegenbauer
-// polynomials of the cosine, at most (power + j - 1 over j); each bound is at most `next` times the
-// one before. Heights over the planes differ by at most `apart` from that over the center: where p
-// may be in front of some planes alone, they are at most twice that.
+// polynomials of the cosine, at most (power + j - 1 over j), so that each bound is at most `next`
+// times the one before. Heights over the planes differ by at most `apart` from the height over the
+// plane through the center. Hence, if p may be in front of some planes only, all heights are at
+// most 2 `apart`.
 SEMBLANCE_WIDE double MultipoleLanes::ErrorInBox(const Vec3& box_center, const Vec3& half,
                                                  int power) const {
   const auto load = [](const Lanes& lanes) { return Load<Wide>(lanes, 0); };
@@ -193,9 +195,10 @@ SEMBLANCE_WIDE double MultipoleLanes::ErrorInBox(const Vec3& box_center, const V
   const Wide height =
       Smaller<Wide>((over + reach + furthest_apart + load(plane_mm)) * inverse, All<Wide>(1));
   const Wide of_third = load(third) * height * third_up + load(third_by_plane) * second_up;
-  const Wide in_front = InversePowerOf(nearest2, power, power) *
+  const Wide in_front = InversePowerFromSquare(nearest2, power, power) *
                         (load(first) + inverse * (load(second) + inverse * of_third));
-  const Wide of_some = 2 * apart * load(gain) * InversePowerOf<Wide>(beyond * beyond, power, power);
+  const Wide of_some =
+      2 * apart * load(gain) * InversePowerFromSquare<Wide>(beyond * beyond, power, power);
   const Wide error = over - reach >= furthest_apart ? in_front : Greater(in_front, of_some);
   const Wide usable = next < 1 ? error : All<Wide>(std::numeric_limits<double>::infinity());
   Lanes errors;
@@ -205,7 +208,7 @@ SEMBLANCE_WIDE double MultipoleLanes::ErrorInBox(const Vec3& box_center, const V
 
 SEMBLANCE_WIDE double SumMultipoles(std::span<const MultipoleLanes> lanes,
                                     std::span<const std::int32_t> which, const Vec3& p, int power) {
-  constexpr int kUsual = 9;  // of the default decay
+  constexpr int kDefaultPower = 9;  // of the default decay
   Wide sum{};
   for (const std::int32_t n : which) {
     const MultipoleLanes& b = lanes[n];
@@ -217,8 +220,9 @@ SEMBLANCE_WIDE double SumMultipoles(std::span<const MultipoleLanes> lanes,
     const Wide along2 = x * (x * load(b.bend[0]) + y * load(b.bend[3]) + z * load(b.bend[4])) +
                         y * (y * load(b.bend[1]) + z * load(b.bend[5])) + z * z * load(b.bend[2]);
     const Wide order2 = inverse2 * (along2 * inverse2 - load(b.fade));
-    const Wide fall =
-        power == kUsual ? InversePowerOf(r2, kUsual, kUsual) : InversePowerOf(r2, power, power);
+    const Wide fall = power == kDefaultPower
+                          ? InversePowerFromSquare(r2, kDefaultPower, kDefaultPower)
+                          : InversePowerFromSquare(r2, power, power);
     sum += Greater(facing, Wide{}) * fall * (1 + order2);
   }
   MultipoleLanes::Lanes sums;

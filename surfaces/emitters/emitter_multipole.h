@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The second-order multipole expansion of what several flat emitters give together from afar, with
-// a bound on its error.
+// The second-order multipole expansion of the joint far field of several flat emitters, with a
+// bound on its error (docs/mathematics.md, 2).
 #pragma once
 
 #include <array>
@@ -12,29 +12,30 @@
 
 namespace semblance {
 
-// The emitters' sum at p is
+// The sum of the emitters at p is
 //   K = sum of gain * integral of max(n.(p - x), 0) / |p - x|^power dm(x),
-// m the share of the triangle's depth^decay. In front of all planes its Taylor series about x =
-// center is kept to the second order as far as
+// where m weights a triangle's points by depth^decay relative to its mean. In front of all planes
+// the Taylor series of K about x = center is kept to the second order in the form
 //   (N.u) |u|^-power (1 + power / 2 |u|^-2 ((power + 2) u'Cu |u|^-2 - tr C))
-// gives it, u = p - center, N = sum of gain n, C the spread; 0 where N.u <= 0.
+// with u = p - center, N = sum of gain n, and C the spread. It is 0 for N.u <= 0.
 struct EmitterMultipole {
   Vec3 gain_normal = Vec3::Zero();
-  Vec3 center = Vec3::Constant(kNaN);  // where the first order's trace is 0
-  Mat3 spread_mm2 = Mat3::Zero();      // second moment about the center, weighted by gain n.N
+  Vec3 center = Vec3::Constant(kNaN);  // the trace of the first moments is 0 about it
+  Mat3 spread_mm2 = Mat3::Zero();      // second moments about the center, weighted by gain n.N
 
-  // What bounds the error: how far the emitters and their planes are from the center, their normals
-  // from N's, and what the form above lacks of the first and the second order.
+  // Data of the error bound: largest distances of the emitters and of their planes from the center,
+  // largest difference of a normal from N / |N|, and the parts of the first and second order that
+  // the form above lacks.
   double radius_mm = std::numeric_limits<double>::infinity(), plane_mm = 0, tilt = 0;
   double gain = 0, first = 0, second = 0;
-  double third = 0, third_by_plane = 0;  // moments |x - center|^3, |n.(x - center)| |x - center|^2
+  double third = 0, third_by_plane = 0;  // |x - center|^3; |n.(x - center)| |x - center|^2
 };
 
-// decay: of the flat emitter; power = decay + 3, whole. Where depths are linear, moments are taken
-// by quadrature.
-EmitterMultipole MultipoleOf(std::span<const EmitterTriangle> emitters, int decay);
+// Computes the expansion for an integer decay of the flat emitter; power = decay + 3. Moments of
+// linear depths are computed by quadrature.
+EmitterMultipole MakeMultipole(std::span<const EmitterTriangle> emitters, int decay);
 
-// Four multipoles side by side, one per lane. A lane that was not set emits nothing.
+// Four multipoles, one per lane. A lane that was not set emits nothing.
 struct alignas(64) MultipoleLanes {
   static constexpr int kLanes = 4;
   using Lanes = std::array<double, kLanes>;
@@ -42,19 +43,19 @@ struct alignas(64) MultipoleLanes {
   MultipoleLanes();
   void Set(int lane, const EmitterMultipole& multipole, int power);
 
-  // Not less than how much all four together err anywhere within `half`, each way, of the center;
-  // infinity where a series is of no use.
+  // An upper bound of the joint error of all four in the box center +- half; infinite where a
+  // series does not converge.
   double ErrorInBox(const Vec3& box_center, const Vec3& half, int power) const;
 
   std::array<Lanes, 3> at, gain_normal{};
   std::array<Lanes, 6> bend{};  // power (power + 2) / 2 times xx, yy, zz, 2 xy, 2 xz, 2 yz
-  Lanes fade{};                 // power / 2 times the trace
-  // What bounds the error, as in EmitterMultipole.
+  Lanes fade{};                 // power / 2 times the trace of C
+  // Data of the error bound, as in EmitterMultipole.
   std::array<Lanes, 3> normal{};
   Lanes radius_mm{}, plane_mm{}, tilt{}, gain{}, first{}, second{}, third{}, third_by_plane{};
 };
 
-// The sum at p of some of the lanes, by their numbers. The same bits whatever the processor.
+// The sum at p over some groups of lanes, given by index. Gives the same bits on every processor.
 double SumMultipoles(std::span<const MultipoleLanes> lanes, std::span<const std::int32_t> which,
                      const Vec3& p, int power);
 

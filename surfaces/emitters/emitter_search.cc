@@ -13,14 +13,17 @@ namespace {
 
 constexpr int kLanes = EmissionUpperBound::kLanes, kLeaf = 4;
 static_assert(kLanes == FlatEmitterLanes::kLanes && kLanes == DistanceEmitterLanes::kLanes);
-// Multipoles are worth their budget where they err so much less than to leave the emitters out.
-constexpr double kWorth = 0.25;
+// Emitters are summed by multipoles only if this errs less than this share of leaving them out. A
+// larger share spends more of the error budget on multipoles (docs/mathematics.md, "The far
+// field").
+constexpr double kMaxErrorShare = 0.25;
 
-// Builds the tree: a leaf begins at a multiple of four, a node of more than four emitters at one of
-// the lanes'. Each 16, 64 or 256 that begin at a multiple of that are a node.
+// Builds the tree. A leaf begins at a multiple of 4, and a larger node at a multiple of the lane
+// count. Each block of 16, 64 or 256 emitters that begins at a multiple of its size is a node, so
+// that it can have multipoles.
 class TreeBuilder {
  public:
-  // Puts the emitters in the tree's order.
+  // Reorders the emitters into the tree's order.
   static std::vector<EmitterNode> Build(std::vector<EmitterTriangle>& emitters) {
     TreeBuilder builder(emitters);
     builder.Split(0, static_cast<int>(emitters.size()));
@@ -58,7 +61,7 @@ class TreeBuilder {
     return self;
   }
 
-  // Partitions along the longest side of the centroids' box; returns where.
+  // Partitions along the longest side of the centroids' box and returns the middle.
   int Halve(int begin, int end) {
     Box3 centroids;
     for (int n = begin; n < end; ++n) {
@@ -66,7 +69,7 @@ class TreeBuilder {
     }
     int axis = 0;
     centroids.sizes().maxCoeff(&axis);
-    int unit = kLeaf;  // which the left half fills
+    int unit = kLeaf;  // size that the left half is a multiple of
     for (const int block : {kLanes, 16, 64, 256}) {
       unit = end - begin > block ? block : unit;
     }
@@ -95,10 +98,11 @@ class TreeBuilder {
       Add(nodes_[node.left], node);
       Add(nodes_[node.right], node);
     }
-    constexpr int kMany = 256;  // one by one it would not be much better
-    if (node.end - node.begin > kMany) {
+    constexpr int kExactSize = 256;  // larger nodes use their children's bounds, which are hardly
+                                     // looser
+    if (node.end - node.begin > kExactSize) {
       node.lowest_mm =
-          std::min(LowestOf(nodes_[node.left], node), LowestOf(nodes_[node.right], node));
+          std::min(LowestPlane(nodes_[node.left], node), LowestPlane(nodes_[node.right], node));
       return;
     }
     for (int e = node.begin; e < node.end; ++e) {
@@ -121,8 +125,8 @@ class TreeBuilder {
     node.gain += part.gain;
     node.greatest_gain = std::max(node.greatest_gain, part.greatest_gain);
   }
-  // Not more than any of a part's planes is over the center of the node's box.
-  static double LowestOf(const EmitterNode& part, const EmitterNode& node) {
+  // A lower bound of the part's planes relative to the center of the node's box.
+  static double LowestPlane(const EmitterNode& part, const EmitterNode& node) {
     const Vec3 to = part.box.center() - node.box.center();
     return part.lowest_mm +
            part.normals.min().cwiseProduct(to).cwiseMin(part.normals.max().cwiseProduct(to)).sum();
@@ -132,8 +136,7 @@ class TreeBuilder {
   std::vector<EmitterNode> nodes_;
 };
 
-// Not less than the height of any point within half of p, each way, over the plane of any of the
-// node's emitters.
+// An upper bound of the height of points in p +- half over the planes of the node's emitters.
 double MostHeight(const EmitterNode& node, const Vec3& p, const Vec3& half) {
   const Vec3 &low = node.normals.min(), &high = node.normals.max();
   const Vec3 from = p - node.box.center();
@@ -143,8 +146,8 @@ double MostHeight(const EmitterNode& node, const Vec3& p, const Vec3& half) {
          kRounding * ((from.cwiseAbs() + half).sum() + std::abs(node.lowest_mm));
 }
 
-// Goes down from the root in a fixed order, by the nodes' numbers: no further where done(node), and
-// visits those of at most `few` emitters where not.
+// Descends from the root in the order of node numbers. It stops at nodes for which done(node) is
+// true, and visits the other nodes of at most `few` emitters.
 template <class Done, class Visit>
 void DescendTree(std::span<const EmitterNode> nodes, int few, const Done& done,
                  const Visit& visit) {
@@ -174,19 +177,19 @@ std::vector<EmissionUpperBound> MakeUpperBounds(const std::vector<EmitterTriangl
   return bounds;
 }
 
-// Of the four parts of a node of up to 4 * part emitters.
-MultipoleLanes MultipolesOf(std::span<const EmitterTriangle> emitters, std::size_t part,
-                            int power) {
+// The multipoles of the four parts of a node of up to 4 * part emitters.
+MultipoleLanes MakeMultipoleLanes(std::span<const EmitterTriangle> emitters, std::size_t part,
+                                  int power) {
   MultipoleLanes lanes;
   for (int lane = 0; lane * part < emitters.size(); ++lane) {
     const std::size_t begin = lane * part, count = std::min(part, emitters.size() - begin);
-    lanes.Set(lane, MultipoleOf(emitters.subspan(begin, count), power - 3), power);
+    lanes.Set(lane, MakeMultipole(emitters.subspan(begin, count), power - 3), power);
   }
   return lanes;
 }
 
-// A quarter of 16, 64 or 256, if the node is all emitters from a multiple of that on; else 0.
-int PartOf(const EmitterNode& node, int emitters) {
+// A quarter of 16, 64 or 256 if the node is an aligned block of that size, else 0.
+int MultipolePart(const EmitterNode& node, int emitters) {
   int block = 16;
   while (block < node.end - node.begin) {
     block *= 4;
@@ -195,8 +198,8 @@ int PartOf(const EmitterNode& node, int emitters) {
   return whole && block <= 256 ? block / 4 : 0;
 }
 
-// Drops, smallest first, what together is at most `budget` of some numbers >= 0: sets each of these
-// to 0 and returns their sum. By powers of 2, so that nothing is sorted.
+// Sets the smallest of some numbers >= 0 to 0, as long as their sum stays within `budget`, and
+// returns the sum. Groups the numbers by powers of 2 instead of sorting them.
 double DropWithinBudget(double budget, std::vector<double>& errors) {
   if (!(budget > 0)) {
     return 0;
@@ -206,7 +209,7 @@ double DropWithinBudget(double budget, std::vector<double>& errors) {
     return static_cast<int>(std::bit_cast<std::uint64_t>(value) >> 52);
   };
   const int first = exponent(budget);
-  std::array<double, kPowers> sums{};  // [n]: of numbers of about budget / 2^n
+  std::array<double, kPowers> sums{};  // [n]: sum of numbers of about budget / 2^n
   for (const double value : errors) {
     const int power = first - exponent(value);
     if (power >= 0) {
@@ -238,11 +241,11 @@ EmitterSearch::EmitterSearch(std::vector<EmitterTriangle>& emitters,
 
 void EmitterSearch::MakeMultipoles(const std::vector<EmitterTriangle>& emitters) {
   for (const EmitterNode& node : nodes_) {
-    const int part = PartOf(node, static_cast<int>(emitters.size()));
+    const int part = MultipolePart(node, static_cast<int>(emitters.size()));
     multipoles_of_.push_back(part > 0 ? static_cast<int>(multipoles_.size()) : -1);
     if (part > 0) {
       const auto of_node = std::span(emitters).subspan(node.begin, node.end - node.begin);
-      multipoles_.push_back(MultipolesOf(of_node, part, options_.falloff.whole));
+      multipoles_.push_back(MakeMultipoleLanes(of_node, part, options_.falloff.whole));
     }
   }
 }
@@ -250,7 +253,7 @@ void EmitterSearch::MakeMultipoles(const std::vector<EmitterTriangle>& emitters)
 NeighbourList EmitterSearch::InBox(const Box3& box, FarField far, double& left_out) const {
   const QueryBox query{box, box.center(), 0.5 * box.sizes(),
                        far == FarField::kMultipole && !multipoles_.empty()};
-  // Of the tail error, for one node: a first guess that nearly always does.
+  // The error allowed per node. The first guess nearly always suffices.
   double least = (query.by_multipoles ? 1.0 / 512 : 1.0 / 128) * options_.tail_error;
   Pruned pruned;
   do {
@@ -264,7 +267,7 @@ NeighbourList EmitterSearch::InBox(const Box3& box, FarField far, double& left_o
   return Choose(candidates, std::move(pruned), left_out);
 }
 
-// Nodes that may be left out, or summed by multipoles, at an error of at most `least` each.
+// Finds nodes that can be left out or summed by multipoles with an error of at most `least` each.
 EmitterSearch::Pruned EmitterSearch::Descend(const QueryBox& query, double least) const {
   Pruned pruned;
   const int few = (query.by_multipoles ? 2 : 4) * kLanes;
@@ -274,17 +277,18 @@ EmitterSearch::Pruned EmitterSearch::Descend(const QueryBox& query, double least
   return pruned;
 }
 
-// False where the node emits too much for both.
+// Returns false if the node emits too much for either.
 bool EmitterSearch::Prune(int node, const QueryBox& query, double least, Pruned& pruned) const {
-  constexpr double kHopeless = 4;  // nodes that emit more are too near for multipoles
+  constexpr double kNearNode = 4;  // times the tail error; nodes that emit more are too near for
+                                   // multipoles (saves the bound)
   const double most = UpperBoundOfNode(nodes_[node], query);
   if (most <= least) {
     pruned.error += most;
     return true;
   }
-  const bool may = query.by_multipoles && most < kHopeless * options_.tail_error;
+  const bool may = query.by_multipoles && most < kNearNode * options_.tail_error;
   const double error = may ? MultipoleError(node, query) : most;
-  if (error > least || error > kWorth * most) {
+  if (error > least || error > kMaxErrorShare * most) {
     return false;
   }
   pruned.error += error;
@@ -292,7 +296,7 @@ bool EmitterSearch::Prune(int node, const QueryBox& query, double least, Pruned&
   return true;
 }
 
-// The most that a node's emitters together give in the box.
+// An upper bound of the joint emission of a node's emitters in the box.
 double EmitterSearch::UpperBoundOfNode(const EmitterNode& node, const QueryBox& query) const {
   const double height = MostHeight(node, query.center, query.half);
   if (height <= 0) {
@@ -307,7 +311,7 @@ double EmitterSearch::UpperBoundOfNode(const EmitterNode& node, const QueryBox& 
   return cut ? 0 : node.gain * share;
 }
 
-// Infinity where the node has no multipoles.
+// The error bound of the node's multipoles; infinite if it has none.
 double EmitterSearch::MultipoleError(int node, const QueryBox& query) const {
   const int lanes = multipoles_of_[node];
   return lanes < 0
@@ -317,22 +321,23 @@ double EmitterSearch::MultipoleError(int node, const QueryBox& query) const {
 
 void EmitterSearch::AppendCandidates(int node, const QueryBox& query,
                                      std::vector<Candidate>& candidates) const {
-  constexpr double kLittle = 0.01, kNear = 32;  // of the tail error: multipoles are of no use
+  constexpr double kNegligible = 0.01, kTooNear = 32;  // times the tail error: outside these,
+                                                       // multipoles do not pay
   const EmitterNode& of = nodes_[node];
   const std::size_t first = candidates.size();
   const double most = AppendRuns(of, query, candidates);
   const double tail_error = options_.tail_error;
-  if (!query.by_multipoles || most < kLittle * tail_error || most > kNear * tail_error) {
+  if (!query.by_multipoles || most < kNegligible * tail_error || most > kTooNear * tail_error) {
     return;
   }
   const double error = MultipoleError(node, query);
-  if (error < kWorth * most) {
+  if (error < kMaxErrorShare * most) {
     candidates.resize(first);
     candidates.push_back({of.begin, of.end, error, multipoles_of_[node]});
   }
 }
 
-// Returns the most that all of them emit.
+// Appends the node's runs and returns an upper bound of their joint emission.
 double EmitterSearch::AppendRuns(const EmitterNode& node, const QueryBox& query,
                                  std::vector<Candidate>& candidates) const {
   EmissionUpperBound::Lanes most;
@@ -350,7 +355,7 @@ double EmitterSearch::AppendRuns(const EmitterNode& node, const QueryBox& query,
   return sum;
 }
 
-// Leaves out, or sums by multipoles, what together errs by at most what is left of the tail error.
+// Leaves out candidates, or sums them by multipoles, within the remaining tail error.
 NeighbourList EmitterSearch::Choose(const std::vector<Candidate>& candidates, Pruned pruned,
                                     double& left_out) const {
   std::vector<double> errors;

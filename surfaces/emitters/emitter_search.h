@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which emitters the points of a box have to sum one by one, which by multipoles, and which may be
-// left out: a treecode over the emitters (Barnes & Hut 1986). For the implicit surface alone.
+// A treecode over the emitters (Barnes & Hut 1986). For the points of a box it decides which
+// emitters to sum one by one, which to sum by multipoles, and which to leave out, within an error
+// bound. Used by the implicit surface only.
 #pragma once
 
 #include <array>
@@ -21,41 +22,41 @@
 namespace semblance {
 
 struct NeighbourList {
-  // Runs of 4 or 8 emitters, in the tree's order: each the number of its first over its length.
+  // Runs of 4 or 8 emitters in the tree's order, given by (index of first emitter) / (run length).
   std::vector<std::int32_t> runs;
-  std::vector<std::int32_t> multipoles;  // four at once, by number
-  std::vector<ReachLanes> reaches;       // of the runs, where emitters are summed by distance
+  std::vector<std::int32_t> multipoles;  // indices of groups of four
+  std::vector<ReachLanes> reaches;       // per run, for the thesis's emitters
 };
 
-// Bounds over emitters begin .. end - 1.
+// A node of the tree: emitters begin .. end - 1, with bounds of their emission.
 struct EmitterNode {
-  Box3 box;  // of the triangles and of where they are moved to
-  Box3 normals;
-  double lowest_mm =
-      std::numeric_limits<double>::infinity();  // over planes through the box's center
+  Box3 box;      // around the triangles and their places of emission
+  Box3 normals;  // around the unit normals
+  double lowest_mm = std::numeric_limits<double>::infinity();  // lowest plane along its normal,
+                                                               // from the box's center
   int begin = 0, end = 0;
-  int left = -1, right = -1;  // -1 in a leaf
-  double gain = 0;            // sum over its emitters
+  int left = -1, right = -1;  // children; -1 in a leaf
+  double gain = 0;            // sum of gains
   double greatest_gain = 0;
 };
 
-// Whether emitters far from a box are summed as multipoles where they may be.
+// The use of multipoles for emitters far from a box.
 enum class FarField { kNone, kMultipole };
 
 struct EmitterSearchOptions {
   Falloff falloff;
-  int run = 0;              // how many emitters are summed or left out together: 4 or 8
-  bool multipoles = false;  // for flat emitters of a whole power
+  int run = 0;              // emitters that are summed or left out together: 4 or 8
+  bool multipoles = false;  // only for flat emitters with an integer power
   double tail_error = kNaN;
 };
 
 class EmitterSearch {
  public:
-  // Puts the emitters in the order of its tree. Their gains are set.
+  // Reorders the emitters, whose gains must be set, into the order of the tree.
   EmitterSearch(std::vector<EmitterTriangle>& emitters, const EmitterSearchOptions& options);
 
-  // For points of the box: what is left out and the errors of the multipoles together are at most
-  // the tail error; left_out: that sum.
+  // Chooses the emitters for points of the box. The omitted emissions and the errors of multipoles
+  // sum to at most the tail error; left_out returns the bound of that sum.
   NeighbourList InBox(const Box3& box, FarField far, double& left_out) const;
 
   std::span<const MultipoleLanes> multipoles() const { return multipoles_; }
@@ -66,18 +67,18 @@ class EmitterSearch {
     Vec3 center, half;
     bool by_multipoles;
   };
-  // What a way down the tree leaves out or sums by multipoles, by how much that errs, and the
-  // nodes that it leaves to be looked at one run after the other.
+  // The result of a descent: nodes summed by multipoles, the error of these and of omitted nodes,
+  // and the nodes whose runs need a closer look.
   struct Pruned {
     std::vector<std::int32_t> multipoles;
     double error = 0;
     std::vector<int> rest;
   };
-  // Emitters that may be left out, or summed by multipoles, and by how much that errs.
+  // Emitters that may be left out or summed by multipoles, with the error of doing so.
   struct Candidate {
     int begin, end;
     double error;
-    int multipoles = -1;  // four of them; -1: to be left out
+    int multipoles = -1;  // index of a group; -1: to be left out
   };
 
   void MakeMultipoles(const std::vector<EmitterTriangle>& emitters);
@@ -92,14 +93,14 @@ class EmitterSearch {
                        double& left_out) const;
 
   EmitterSearchOptions options_;
-  std::vector<EmitterNode> nodes_;                // the root first
-  std::vector<EmissionUpperBound> upper_bounds_;  // of each eight emitters
-  std::vector<MultipoleLanes> multipoles_;        // of nodes; none where there are none
-  std::vector<int> multipoles_of_;                // of each node; -1: none
+  std::vector<EmitterNode> nodes_;                // root first
+  std::vector<EmissionUpperBound> upper_bounds_;  // per eight emitters
+  std::vector<MultipoleLanes> multipoles_;        // groups of four, per node that has them
+  std::vector<int> multipoles_of_;                // per node; -1 if it has none
 };
 
-// Neighbour lists of cubes of a lattice. They are kept in a table of fixed size, where a new one
-// may put out an old one: what is found for a point depends on the point alone.
+// Caches neighbour lists per cube of a lattice, in a table of fixed size in which a new list may
+// replace an old one. The list found for a point depends on the point only.
 class NeighbourListCache {
  public:
   using List = std::shared_ptr<const NeighbourList>;
@@ -107,11 +108,11 @@ class NeighbourListCache {
   // cube_mm > 0.
   explicit NeighbourListCache(double cube_mm) : cube_mm_(cube_mm), sets_(kSets) {}
 
-  // make(box) gives the list of a cube. Safe from several threads at once.
+  // Returns the list of p's cube, and computes it by make(box) if it is not cached. Thread-safe.
   template <class Make>
   List Find(const Vec3& p, const Make& make) const {
     const Vec3 cube = (p / cube_mm_).array().floor();
-    Set& set = sets_[SetOf(cube)];
+    Set& set = sets_[SetIndex(cube)];
     {
       const std::lock_guard lock(set.mutex);
       for (const Slot& slot : set.slots) {
@@ -120,7 +121,7 @@ class NeighbourListCache {
         }
       }
     }
-    List list = std::make_shared<const NeighbourList>(make(BoxOf(cube)));
+    List list = std::make_shared<const NeighbourList>(make(CubeBox(cube)));
     const std::lock_guard lock(set.mutex);
     set.slots[set.next] = {cube, list};
     set.next = (set.next + 1) % set.slots.size();
@@ -134,15 +135,15 @@ class NeighbourListCache {
     Vec3 cube = Vec3::Zero();
     List list;
   };
-  // Cubes that share a line of the table: with four of them, cubes of one surface, some tens of
-  // thousands at most, seldom put each other out.
+  // Cubes with the same hash. Four slots suffice that the cubes of one surface, some ten thousands
+  // at most, seldom replace each other (with one slot each list was computed six times).
   struct Set {
     std::mutex mutex;
     std::array<Slot, 4> slots;
-    std::size_t next = 0;  // that is filled
+    std::size_t next = 0;  // slot to fill next
   };
 
-  static std::size_t SetOf(const Vec3& cube) {
+  static std::size_t SetIndex(const Vec3& cube) {
     std::uint64_t hash = 0;
     for (int axis = 0; axis < 3; ++axis) {
       hash += std::bit_cast<std::uint64_t>(cube[axis]);
@@ -152,7 +153,7 @@ class NeighbourListCache {
     }
     return hash % kSets;
   }
-  Box3 BoxOf(const Vec3& cube) const {
+  Box3 CubeBox(const Vec3& cube) const {
     const Vec3 low = cube_mm_ * cube;
     const Vec3 slack = Vec3::Constant(kRounding * (cube_mm_ + 1e-3 * low.cwiseAbs().maxCoeff()));
     return {low - slack, low + Vec3::Constant(cube_mm_) + slack};

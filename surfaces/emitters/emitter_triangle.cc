@@ -23,7 +23,7 @@ struct DeepTriangle {
   Vec3 AreaVector() const { return 0.5 * (corner[1] - corner[0]).cross(corner[2] - corner[0]); }
 };
 
-// The gradient of the depth over its mean, in the plane.
+// The gradient of the depth in the plane, divided by the mean depth.
 Vec3 RelativeSlope(const DeepTriangle& t, const Vec3& normal, double area_mm2) {
   Vec3 sum = Vec3::Zero();
   for (int c = 0; c < 3; ++c) {
@@ -56,12 +56,13 @@ EmitterTriangle MakeTriangle(const DeepTriangle& t, EmitterDepth depth) {
   return e;
 }
 
-// Appends the triangle, or, where the depth is linear and changes much, its quarters.
+// Appends the triangle, or its quarters if the depth is linear and changes much.
 void AppendEmitters(const DeepTriangle& t, EmitterDepth depth,
                     std::vector<EmitterTriangle>& emitters) {
-  constexpr double kMostChange = 0.15;  // of the mean
+  constexpr double kMaxChange = 0.15;  // of the mean depth; bounds the error of the second-order
+                                       // formulas, against more emitters
   const auto [least, most] = std::minmax_element(t.depth_mm.begin(), t.depth_mm.end());
-  if (depth == EmitterDepth::kMean || *most - *least <= kMostChange * t.MeanDepth()) {
+  if (depth == EmitterDepth::kMean || *most - *least <= kMaxChange * t.MeanDepth()) {
     emitters.push_back(MakeTriangle(t, depth));
     return;
   }
@@ -135,7 +136,9 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
   }
   if (emitters.empty()) {
     throw InputError(
-        "implicit surface: no triangle has a depth at all three corners; nothing emits");
+        "implicit surface: no triangle has a depth at all three corners, so nothing emits; give "
+        "depths "
+        "to neighbouring vertices");
   }
   return emitters;
 }

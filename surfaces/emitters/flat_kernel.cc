@@ -16,18 +16,20 @@
 namespace semblance {
 namespace {
 
-constexpr double kTiny = 1e-300;       // mm^2
-constexpr double kLostDigits = 1e-13;  // of 1e-16, what cancellation leaves is 0.1 %
-// Squared longest edge over squared distance up to which one triangle alone is taken by its
-// centroid, and a part of one by its edge midpoints.
+constexpr double kTiny = 1e-300;       // mm^2; avoids 1 / 0
+constexpr double kLostDigits = 1e-13;  // the closed form keeps 1e-16 / 1e-13 = 0.1 % after
+                                       // cancellation
+// The largest (longest edge / distance)^2 for the centroid rule on one triangle, and for the
+// edge-midpoint rule on a part of it. Smaller values cost time and gain accuracy.
 constexpr double kCentroidShare = 0.02, kMidpointShare = 0.06;
 
-// A point of a triangle, its centroid + ab u + ac v, and its share of the mean.
+// A quadrature point, centroid + ab u + ac v, and its weight.
 struct Sample {
   double u, v, weight;
 };
 
-// Weights of the corners of three samples that are alike; the third is what is left of 1.
+// Appends three symmetric points: two barycentric coordinates are `corner`, the third is 1 - 2
+// corner.
 constexpr void Append(double corner, double weight, Sample*& to) {
   const double third = 1.0 / 3, other = 1 - 2 * corner;
   *to++ = {corner - third, corner - third, weight};
@@ -35,7 +37,7 @@ constexpr void Append(double corner, double weight, Sample*& to) {
   *to++ = {corner - third, other - third, weight};
 }
 
-// Dunavant 1985: exact to degree 4 and to degree 6.
+// Quadrature rules of degree 4 (six points) and degree 6 (twelve points), Dunavant 1985.
 constexpr auto kSix = [] {
   std::array<Sample, 6> samples{};
   Sample* to = samples.data();
@@ -61,69 +63,70 @@ constexpr auto kTwelve = [] {
   return samples;
 }();
 
-// Squared longest edge over squared distance up to which the centroid and the second derivative
-// there, six and twelve samples keep within 1 %, for powers up to 9.
-constexpr std::array<double, 3> kMostShare = {0.04, 0.35, 0.9};
+// The largest (longest edge / distance)^2 for which the centroid with the second derivative, six
+// points and twelve points err by less than 1 %, for powers up to 9 (found by experiment).
+constexpr std::array<double, 3> kMaxShare = {0.04, 0.35, 0.9};
 
-// Some lanes, from `first` on.
+// Four lanes, from `first` on, and a point relative to them.
 struct Four {
   const FlatEmitterLanes& batch;
   int first;
-  Wide dx, dy, dz, r2, inverse2;  // of the point from the centroid
-  Wide height, share;             // the squared longest edge over the squared distance
+  Wide dx, dy, dz, r2, inverse2;  // from the centroid to the point
+  Wide height, share;             // share: (longest edge / distance)^2
 
-  SEMBLANCE_INLINE Wide Of(const FlatEmitterLanes::Lanes& lanes) const {
+  SEMBLANCE_INLINE Wide Get(const FlatEmitterLanes::Lanes& lanes) const {
     return Load<Wide>(lanes, first);
   }
 };
 
 SEMBLANCE_INLINE Four See(const FlatEmitterLanes& b, int first, const Vec3& p) {
   Four seen{b, first, {}, {}, {}, {}, {}, {}, {}};
-  seen.dx = p.x() - seen.Of(b.at[0]);
-  seen.dy = p.y() - seen.Of(b.at[1]);
-  seen.dz = p.z() - seen.Of(b.at[2]);
+  seen.dx = p.x() - seen.Get(b.at[0]);
+  seen.dy = p.y() - seen.Get(b.at[1]);
+  seen.dz = p.z() - seen.Get(b.at[2]);
   seen.r2 =
       Greater<Wide>(seen.dx * seen.dx + seen.dy * seen.dy + seen.dz * seen.dz, All<Wide>(kTiny));
-  seen.height = seen.dx * seen.Of(b.normal[0]) + seen.dy * seen.Of(b.normal[1]) +
-                seen.dz * seen.Of(b.normal[2]);
+  seen.height = seen.dx * seen.Get(b.normal[0]) + seen.dy * seen.Get(b.normal[1]) +
+                seen.dz * seen.Get(b.normal[2]);
   seen.inverse2 = 1 / seen.r2;
-  seen.share = seen.Of(b.longest_mm2) * seen.inverse2;
+  seen.share = seen.Get(b.longest_mm2) * seen.inverse2;
   return seen;
 }
 
-// By the centroid, corrected by half the trace of the integrand's Hessian times the triangle's
-// covariance. The depth over its mean changes with the integrand (tilt) and on its own (bow).
+// The mean by the value at the centroid plus half the trace of the integrand's Hessian times the
+// covariance of the triangle's points. The relative depth adds a mixed term (tilt) and its own
+// second-order term (bow).
 SEMBLANCE_INLINE Wide MeanFromAfar(const Four& seen, int power) {
   const FlatEmitterLanes& b = seen.batch;
   const Wide along_ab =
-      seen.dx * seen.Of(b.ab[0]) + seen.dy * seen.Of(b.ab[1]) + seen.dz * seen.Of(b.ab[2]);
+      seen.dx * seen.Get(b.ab[0]) + seen.dy * seen.Get(b.ab[1]) + seen.dz * seen.Get(b.ab[2]);
   const Wide along_ac =
-      seen.dx * seen.Of(b.ac[0]) + seen.dy * seen.Of(b.ac[1]) + seen.dz * seen.Of(b.ac[2]);
+      seen.dx * seen.Get(b.ac[0]) + seen.dy * seen.Get(b.ac[1]) + seen.dz * seen.Get(b.ac[2]);
   const Wide along_bc = along_ac - along_ab, inverse2 = seen.inverse2;
   const Wide along2 =
       (along_ab * along_ab + along_ac * along_ac + along_bc * along_bc) * (1.0 / 36);
   Wide bend =
-      1 + (0.5 * power) * inverse2 * ((power + 2.0) * along2 * inverse2 - seen.Of(b.spread_mm2));
+      1 + (0.5 * power) * inverse2 * ((power + 2.0) * along2 * inverse2 - seen.Get(b.spread_mm2));
   if (b.sloped) {
     const Wide tilt = power * inverse2 *
-                      (seen.dx * seen.Of(b.tilt_mm[0]) + seen.dy * seen.Of(b.tilt_mm[1]) +
-                       seen.dz * seen.Of(b.tilt_mm[2]));
-    bend += (power - 3.0) * (tilt + 0.5 * (power - 4) * seen.Of(b.bow));
+                      (seen.dx * seen.Get(b.tilt_mm[0]) + seen.dy * seen.Get(b.tilt_mm[1]) +
+                       seen.dz * seen.Get(b.tilt_mm[2]));
+    bend += (power - 3.0) * (tilt + 0.5 * (power - 4) * seen.Get(b.bow));
   }
-  return bend * InversePowerOf(seen.r2, power, power);
+  return bend * InversePowerFromSquare(seen.r2, power, power);
 }
 
 SEMBLANCE_INLINE Wide MeanOfSamples(const Four& seen, std::span<const Sample> samples, int power) {
   const FlatEmitterLanes& b = seen.batch;
   Wide sum{};
   for (const Sample& s : samples) {
-    const Wide dx = seen.dx - s.u * seen.Of(b.ab[0]) - s.v * seen.Of(b.ac[0]);
-    const Wide dy = seen.dy - s.u * seen.Of(b.ab[1]) - s.v * seen.Of(b.ac[1]);
-    const Wide dz = seen.dz - s.u * seen.Of(b.ab[2]) - s.v * seen.Of(b.ac[2]);
+    const Wide dx = seen.dx - s.u * seen.Get(b.ab[0]) - s.v * seen.Get(b.ac[0]);
+    const Wide dy = seen.dy - s.u * seen.Get(b.ab[1]) - s.v * seen.Get(b.ac[1]);
+    const Wide dz = seen.dz - s.u * seen.Get(b.ab[2]) - s.v * seen.Get(b.ac[2]);
     const Wide r2 = Greater<Wide>(dx * dx + dy * dy + dz * dz, All<Wide>(kTiny));
-    Wide value = s.weight * InversePowerOf(r2, power, power);
+    Wide value = s.weight * InversePowerFromSquare(r2, power, power);
     if (b.sloped) {
-      Wide depth = 1 + s.u * seen.Of(b.rise_ab) + s.v * seen.Of(b.rise_ac);
+      Wide depth = 1 + s.u * seen.Get(b.rise_ab) + s.v * seen.Get(b.rise_ac);
       for (int rest = power - 3; rest > 0; rest >>= 1) {
         value = (rest & 1) != 0 ? value * depth : value;
         depth *= depth;
@@ -134,13 +137,13 @@ SEMBLANCE_INLINE Wide MeanOfSamples(const Four& seen, std::span<const Sample> sa
   return sum;
 }
 
-// How the mean over four triangles is taken: bits.
+// The quadratures that four triangles need.
 struct Ways {
-  unsigned afar, six, twelve;  // != 0: some lane needs it
-  unsigned near;               // of lanes that are too near for all of them
+  unsigned afar, six, twelve;  // != 0 if a lane needs it
+  unsigned near;               // bits: lanes that are too near for all three
 };
 
-SEMBLANCE_INLINE Ways WaysOf(const Wide& share, const std::array<double, 3>& most_share) {
+SEMBLANCE_INLINE Ways ChooseWays(const Wide& share, const std::array<double, 3>& most_share) {
   using Bits = std::int64_t __attribute__((vector_size(32)));
   constexpr Bits kLaneBits = {8, 16, 32, 64};
   const Bits in_front = share > 0, beyond_afar = share > All<Wide>(most_share[0]),
@@ -154,15 +157,15 @@ SEMBLANCE_INLINE Ways WaysOf(const Wide& share, const std::array<double, 3>& mos
   return {all & 1, all & 2, all & 4, all >> 3};
 }
 
-// Adds what four lanes emit; returns those that are too near, as bits. fixed: the power, or 0 where
-// only the quadrature knows it.
+// Adds the emissions of four lanes and returns the bits of lanes that are too near. fixed: the
+// power as a compile-time constant, or 0 to use quadrature.power.
 template <int fixed>
 SEMBLANCE_INLINE unsigned AddFour(const FlatEmitterLanes& batch, int first, const Vec3& p,
                                   const FlatQuadrature& quadrature, Wide& sum) {
   const int power = fixed > 0 ? fixed : quadrature.power;
   const Four seen = See(batch, first, p);
   const Wide share = seen.height > 0 ? seen.share : Wide{};
-  const Ways ways = WaysOf(share, quadrature.most_share);
+  const Ways ways = ChooseWays(share, quadrature.most_share);
   Wide mean{};
   if (ways.afar != 0) {
     mean = share <= All<Wide>(quadrature.most_share[0]) ? MeanFromAfar(seen, power) : mean;
@@ -175,7 +178,7 @@ SEMBLANCE_INLINE unsigned AddFour(const FlatEmitterLanes& batch, int first, cons
     const Wide twelve = MeanOfSamples(seen, kTwelve, power);
     mean = share > All<Wide>(quadrature.most_share[1]) ? twelve : mean;
   }
-  const Wide emission = seen.Of(batch.gain) * seen.height * mean;
+  const Wide emission = seen.Get(batch.gain) * seen.height * mean;
   const Wide taken = share > All<Wide>(quadrature.most_share[2]) ? Wide{} : emission;
   sum += share > 0 ? taken : Wide{};
   return ways.near;
@@ -220,24 +223,25 @@ void FlatEmitterLanes::SetSlope(int lane, const Vec3& slope) {
 }
 
 FlatQuadrature::FlatQuadrature(int of_power) : power(of_power) {
-  const double of_share = std::min(1.0, std::pow(9.0 / power, 1.6));  // by experiment
+  const double of_share = std::min(1.0, std::pow(9.0 / power, 1.6));  // found by experiment
   for (std::size_t n = 0; n < most_share.size(); ++n) {
-    most_share[n] = of_share * kMostShare[n];
+    most_share[n] = of_share * kMaxShare[n];
   }
 }
 
 SEMBLANCE_WIDE void AddFlat(std::span<const FlatEmitterLanes> batches,
                             std::span<const std::int32_t> runs, const Vec3& p,
                             const FlatQuadrature& quadrature, FlatWalk& walk) {
-  constexpr int kUsual = 9;  // of the default decay
+  constexpr int kDefaultPower = 9;  // of the default decay
   Wide sum = Load<Wide>(walk.sum, 0);
   walk.near = 0;
   while (walk.next < runs.size() && walk.near == 0) {
     const std::int32_t run = runs[walk.next++];
     const FlatEmitterLanes& batch = batches[run / 2];
     const int first = run % 2 * kLaneCount<Wide>;
-    walk.near = quadrature.power == kUsual ? AddFour<kUsual>(batch, first, p, quadrature, sum)
-                                           : AddFour<0>(batch, first, p, quadrature, sum);
+    walk.near = quadrature.power == kDefaultPower
+                    ? AddFour<kDefaultPower>(batch, first, p, quadrature, sum)
+                    : AddFour<0>(batch, first, p, quadrature, sum);
   }
   Store(sum, walk.sum, 0);
 }
@@ -253,7 +257,8 @@ double FlatKernel::Gain(const EmitterTriangle& t) const {
   return (decay_ + 1) / (2 * std::numbers::pi) * std::pow(t.depth_mm, decay_) * t.area_mm2;
 }
 
-std::vector<FlatEmitterLanes> FlatKernel::LanesOf(std::span<const EmitterTriangle> emitters) const {
+std::vector<FlatEmitterLanes> FlatKernel::MakeLanes(
+    std::span<const EmitterTriangle> emitters) const {
   constexpr std::size_t kLanes = FlatEmitterLanes::kLanes;
   std::vector<FlatEmitterLanes> lanes((emitters.size() + kLanes - 1) / kLanes);
   for (std::size_t e = 0; e < emitters.size(); ++e) {
@@ -285,19 +290,19 @@ double FlatKernel::Emission(const EmitterTriangle& t, const Vec3& p, double heig
   const double r2 = (p - t.centroid).squaredNorm();
   if (t.longest2_mm2 <= kCentroidShare * r2) {
     const double far = t.gain * height * falloff_.InversePower(r2);
-    return std::min(far * FarShare(t, p - t.centroid, r2), kMostEmission);
+    return std::min(far * FarShare(t, p - t.centroid, r2), kMaxEmission);
   }
   if (closed_ < 0) {
-    return std::min(t.gain * height * Mean(t, p, t.a, t.b, t.c, t.longest2_mm2), kMostEmission);
+    return std::min(t.gain * height * Mean(t, p, t.a, t.b, t.c, t.longest2_mm2), kMaxEmission);
   }
   const double integral = ClosedForm(t, p, std::max(height, Lowest(t, r2)));
-  return std::min(t.gain * height * integral / t.area_mm2, kMostEmission);
+  return std::min(t.gain * height * integral / t.area_mm2, kMaxEmission);
 }
 
 double FlatKernel::Above(const EmitterTriangle& t, double depth_share, double height,
                          double distance) const {
   const double gain = depth_share == 1 ? t.gain : t.gain * std::pow(depth_share, decay_);
-  return std::min(gain * height * falloff_.InversePower(distance * distance), kMostEmission);
+  return std::min(gain * height * falloff_.InversePower(distance * distance), kMaxEmission);
 }
 
 double FlatKernel::Lowest(const EmitterTriangle& t, double squared) const {
@@ -316,9 +321,10 @@ double FlatKernel::ClosedForm(const EmitterTriangle& t, const Vec3& p, double he
   if (!t.IsSloped()) {
     return integral;
   }
-  // R^-(n+2) (q - foot) is the gradient of -R^-n / n: the first moment is an integral over edges.
+  // R^-(n+2) (q - foot) is the gradient of -R^-n / n. Hence the first moment is an integral over
+  // edges.
   const std::array<const Vec3*, 3> outward = {&t.edge_normal_a, &t.edge_normal_b, &t.edge_normal_c};
-  double moment = 0;  // along the slope
+  double moment = 0;  // first moment along the slope
   for (int e = 0; e < 3; ++e) {
     moment -= outward[e]->dot(t.slope) / (edges[e].end - edges[e].begin) *
               IntegrateAlong(edges[e], height, closed_) / closed_;
@@ -326,14 +332,14 @@ double FlatKernel::ClosedForm(const EmitterTriangle& t, const Vec3& p, double he
   return integral * Weight(t, (p - t.centroid).dot(t.slope) + moment / integral);
 }
 
-// Depth^k where it is 1 + rise times the mean, over that of the mean. Taken where the integrand has
-// its centroid it is right for a linear depth to second order.
+// (Relative depth)^k at the relative depth 1 + rise. Evaluated at the integrand's centroid it is
+// correct for a linear depth to second order.
 double FlatKernel::Weight(const EmitterTriangle& t, double rise) const {
   return std::pow(std::clamp(1 + rise, t.least_share, t.most_share), decay_);
 }
 
-// The mean over a triangle seen from afar, by `from`, over the value at its centroid: by the
-// integrand's second derivative, and with the depth's weight.
+// The mean over a distant triangle relative to the value at its centroid, from the integrand's
+// second derivative and the depth's weight. from: from the centroid to the point.
 double FlatKernel::FarShare(const EmitterTriangle& t, const Vec3& from, double r2) const {
   const double power = falloff_.power;
   double along2 = 0, spread = 0, nearer = 0, rise2 = 0;
@@ -348,7 +354,7 @@ double FlatKernel::FarShare(const EmitterTriangle& t, const Vec3& from, double r
   return 1 + bend + decay_ * (power * nearer / r2 + 0.5 * (decay_ - 1) * rise2);
 }
 
-// Mean of |p - q|^-(k+3), weighted by the depth, over part a, b, c of a triangle.
+// The mean of |p - q|^-(k+3), weighted by (relative depth)^k, over the part abc of a triangle.
 double FlatKernel::Mean(const EmitterTriangle& t, const Vec3& p, const Vec3& a, const Vec3& b,
                         const Vec3& c, double longest2) const {
   const double floor2 = t.Floor2(1);

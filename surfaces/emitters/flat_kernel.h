@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The flat emitter (emitter.h): eight triangles at once for all points that are not right at them,
-// one by one in closed form right at them.
+// Evaluates the flat emitter (emitter.h): by quadrature for eight triangles at once, and in closed
+// form for single triangles that are near the point.
 #pragma once
 
 #include <array>
@@ -14,8 +14,8 @@
 
 namespace semblance {
 
-// Triangles side by side, one per lane, so that the compiler can take several in one instruction. A
-// lane that was not set emits nothing.
+// Eight triangles, one per lane, so that one instruction processes several. A lane that was not set
+// emits nothing.
 struct alignas(64) FlatEmitterLanes {
   static constexpr int kLanes = 8;
   using Lanes = std::array<double, kLanes>;
@@ -24,54 +24,57 @@ struct alignas(64) FlatEmitterLanes {
   std::array<Lanes, 3> at{};  // centroid, mm
   std::array<Lanes, 3> normal{};
   std::array<Lanes, 3> ab{}, ac{};  // edges, mm
-  Lanes spread_mm2{};               // trace of the covariance of the triangle's area
-  Lanes longest_mm2{};              // squared length of the longest edge
+  Lanes spread_mm2{};               // trace of the covariance of a triangle's points
+  Lanes longest_mm2{};              // squared longest edge
 
-  // Where the depth is linear over some triangle of the batch. Relative to its mean: its rise along
-  // ab and ac, the gradient times the area's covariance, and that times the gradient.
+  // Set if the depth is linear over a triangle of the batch. Relative to the mean depth: the rise
+  // along ab and ac, the gradient times the covariance of the triangle's points, and this times the
+  // gradient.
   bool sloped = false;
   Lanes rise_ab{}, rise_ac{};
   std::array<Lanes, 3> tilt_mm{};
   Lanes bow{};
 
-  // normal: unit.
+  // Stores a triangle.
   void Set(int lane, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& unit_normal,
            double lane_gain);
-  // The gradient of a lane's depth over its mean, in its plane, 1 / mm. After Set.
+  // Stores the depth's gradient in the plane, divided by the mean depth, in 1/mm. Call it after
+  // Set.
   void SetSlope(int lane, const Vec3& slope);
 };
 
-// How the mean over a triangle of |p - q|^-power is taken, by how near the triangle is.
+// Chooses the quadrature for the mean over a triangle of |p - q|^-power, by the triangle's
+// distance.
 struct FlatQuadrature {
   explicit FlatQuadrature(int of_power);  // >= 1
 
   int power;
-  // Squared longest edge over squared distance up to which the centroid with the second derivative,
-  // six and twelve points do.
+  // The largest (longest edge / distance)^2 for the centroid with the second derivative, for six
+  // points, and for twelve points.
   std::array<double, 3> most_share{};
 };
 
-// Where a walk along runs of four lanes has come to.
+// The state of a sum along runs of four lanes.
 struct FlatWalk {
-  std::size_t next = 0;  // of the runs
+  std::size_t next = 0;  // index of the next run
   std::array<double, 4> sum{};
-  unsigned near = 0;  // lanes of the last run that are to be added otherwise, as bits
+  unsigned near = 0;  // bits: lanes of the last run that are too near
 };
 
-// Adds, lane by lane, gain * height * the mean of |p - q|^-power, where sloped weighted by (depth
-// over its mean)^(power - 3), over the triangles of runs of four lanes; nothing at height <= 0. Run
-// r is half r % 2 of batch r / 2. The mean is taken at the centroid with the integrand's second
-// derivative, or at 6 or 12 points, as p is near: within 1 %, and far nearer than that as a rule.
-// Stops after a run with lanes that are too near for that; nothing is added for them. The same bits
-// whatever the processor.
+// Adds gain * height * mean of |p - q|^-power for the triangles of runs of four lanes, and nothing
+// at heights <= 0. Linear depths weight the mean by (relative depth)^(power - 3). Run r is half r %
+// 2 of batch r / 2. The quadrature depends on the distance (FlatQuadrature) and errs by less than 1
+// %, and usually by far less. The walk stops after a run with triangles that are too near; these
+// are not added. Gives the same bits on every processor.
 void AddFlat(std::span<const FlatEmitterLanes> batches, std::span<const std::int32_t> runs,
              const Vec3& p, const FlatQuadrature& quadrature, FlatWalk& walk);
 
-// Where a triangle is near and the decay is not whole, the integral is taken by the three edge
-// midpoints (exact for quadratics) of ever smaller triangles.
+// The flat emitter with any decay. For near triangles an integer decay uses the closed form of
+// polygon_integral.h. Other decays use the edge-midpoint rule (exact for quadratics) on ever
+// smaller triangles.
 class FlatKernel {
  public:
-  // How many emitters are summed or left out together.
+  // Number of emitters that are summed or left out together.
   static constexpr int kRun = FlatEmitterLanes::kLanes / 2;
 
   explicit FlatKernel(const FlatEmitter& o);
@@ -81,24 +84,25 @@ class FlatKernel {
   double Advance(const EmitterTriangle&) const { return 0; }
   double EmittingDepth(const EmitterTriangle& t) const { return t.depth_mm; }
   double Gain(const EmitterTriangle& t) const;
-  // At a height > 0 over the triangle's plane; at most kMostEmission.
+  // The emission at p, at a height > 0 over the triangle's plane; at most kMaxEmission.
   double Emission(const EmitterTriangle& t, const Vec3& p, double height) const;
 
-  // Whether lanes and multipoles can be summed: where the decay is whole.
+  // Returns true if lanes and multipoles can be summed, which needs an integer decay.
   bool HasLanes() const { return closed_ > 0; }
-  // Of each eight emitters, in their order.
-  std::vector<FlatEmitterLanes> LanesOf(std::span<const EmitterTriangle> emitters) const;
-  // All emissions of runs of four of the emitters whose lanes are given.
+  // Groups the emitters by eight, in their order.
+  std::vector<FlatEmitterLanes> MakeLanes(std::span<const EmitterTriangle> emitters) const;
+  // The sum of emissions over runs of four emitters, of which `lanes` are the groups of eight.
   double Sum(std::span<const FlatEmitterLanes> lanes, std::span<const std::int32_t> runs,
              std::span<const EmitterTriangle> emitters, const Vec3& p) const;
 
-  // What the triangle would emit if all of it were this far and had this share of its depth, at
-  // most kMostEmission.
+  // The emission if all points of the triangle were at this distance and had this relative depth;
+  // at most kMaxEmission.
   double Above(const EmitterTriangle& t, double depth_share, double height, double distance) const;
-  // Lower than that the emission is taken as from there, right on the triangle or flat beside it;
-  // squared: of the distance from its centroid.
+  // The smallest height that counts; smaller heights count as this one. It keeps the emission
+  // finite on the triangle, and the closed form accurate beside it. squared: distance^2 from the
+  // centroid.
   double Lowest(const EmitterTriangle& t, double squared) const;
-  // A distance that is not less than what `distance` counts as low over the triangle.
+  // An upper bound of the distance that counts for a point at `distance`, however low it is.
   double Lowered(const EmitterTriangle& t, double distance) const;
 
  private:
@@ -109,10 +113,10 @@ class FlatKernel {
               double longest2) const;
 
   double decay_;
-  int closed_;         // n of IntegrateInversePower; -1 where there is no closed form
-  double flat_share_;  // height^2 over distance^2 that the closed form needs
+  int closed_;         // n of IntegrateInversePower; -1 without a closed form
+  double flat_share_;  // smallest height^2 / distance^2 for the closed form
   Falloff falloff_;
-  FlatQuadrature quadrature_;  // where there is a closed form
+  FlatQuadrature quadrature_;  // used if there is a closed form
 };
 
 }  // namespace semblance

@@ -29,7 +29,8 @@ EmitterDepth DepthOver(const Emitter& emitter) {
   return flat ? flat->depth : EmitterDepth::kMean;
 }
 
-// Integrals of a flat emitter by two numerical ways, each within 1 %.
+// Largest relative difference between two quadratures of a flat emitter, each within 1 %, with a
+// margin.
 constexpr double kFlatShare = 0.025;
 
 void SetGains(const Kernel& kernel, std::vector<EmitterTriangle>& emitters) {
@@ -44,8 +45,10 @@ void SetGains(const Kernel& kernel, std::vector<EmitterTriangle>& emitters) {
       kernel);
 }
 
-std::vector<EmitterTriangle> EmittersOf(const TriMesh& skull, std::span<const double> depth_mm,
-                                        EmitterDepth over_triangle, const Kernel& kernel) {
+std::vector<EmitterTriangle> MakeEmittersWithGains(const TriMesh& skull,
+                                                   std::span<const double> depth_mm,
+                                                   EmitterDepth over_triangle,
+                                                   const Kernel& kernel) {
   std::vector<EmitterTriangle> emitters = MakeEmitters(skull, depth_mm, over_triangle);
   SetGains(kernel, emitters);
   return emitters;
@@ -63,8 +66,8 @@ EmitterSearchOptions SearchOptions(const Kernel& kernel, double tail_error) {
       kernel);
 }
 
-// Of the cubes that share a list of what is near. With a cut a point passes quickly over what does
-// not reach it, so that larger ones pay.
+// The size of the cubes that share a neighbour list: larger cubes need fewer but longer lists. With
+// a cut a point quickly skips emitters that do not reach it, so that larger cubes pay.
 double CubeSize(const std::vector<EmitterTriangle>& emitters, bool cut) {
   const double of_depth = cut ? 1.5 : 0.7;
   const double sum =
@@ -82,7 +85,7 @@ bool HasCut(const Kernel& kernel) {
 struct ImplicitSurface::Impl {
   Impl(const TriMesh& skull, std::span<const double> depth_mm, const ImplicitOptions& options)
       : kernel(std::visit([](const auto& o) { return MakeKernel(o); }, options.emitter)),
-        emitters(EmittersOf(skull, depth_mm, DepthOver(options.emitter), kernel)),
+        emitters(MakeEmittersWithGains(skull, depth_mm, DepthOver(options.emitter), kernel)),
         search(emitters, SearchOptions(kernel, options.tail_error)),
         neighbours(CubeSize(emitters, HasCut(kernel))),
         tail_error(options.tail_error),
@@ -92,12 +95,12 @@ struct ImplicitSurface::Impl {
 
   void MakeLanes(const FlatKernel& k) {
     if (k.HasLanes()) {
-      flat_lanes = k.LanesOf(emitters);
+      flat_lanes = k.MakeLanes(emitters);
     }
   }
   void MakeLanes(const DistanceKernel& k) {
-    distance_lanes = k.LanesOf(emitters);
-    reach_balls = ReachBallsOf(distance_lanes, k.Fall());
+    distance_lanes = k.MakeLanes(emitters);
+    reach_balls = MakeReachBalls(distance_lanes, k.Fall());
   }
 
   NeighbourListCache::List Near(const Vec3& p) const {
@@ -123,9 +126,9 @@ struct ImplicitSurface::Impl {
     return EmitByDistance(distance_lanes[e / kLanes], e % kLanes, p, k.Fall());
   }
 
-  // visit(e) for each emitter of a list's runs.
+  // Calls visit(e) for each emitter of a list's runs.
   template <class Visit>
-  void ForEachOf(const NeighbourList& list, int run_length, const Visit& visit) const {
+  void ForEachEmitter(const NeighbourList& list, int run_length, const Visit& visit) const {
     for (const std::int32_t run : list.runs) {
       const int end = std::min<int>(run_length * (run + 1), static_cast<int>(emitters.size()));
       for (int e = run_length * run; e < end; ++e) {
@@ -134,20 +137,20 @@ struct ImplicitSurface::Impl {
     }
   }
 
-  double SumOf(const FlatKernel& k, const NeighbourList& list, const Vec3& p,
-               std::int64_t& evaluations) const {
+  double SumEmissions(const FlatKernel& k, const NeighbourList& list, const Vec3& p,
+                      std::int64_t& evaluations) const {
     evaluations += FlatKernel::kRun * std::ssize(list.runs) +
                    MultipoleLanes::kLanes * std::ssize(list.multipoles);
     if (!k.HasLanes()) {
       double sum = 0;
-      ForEachOf(list, FlatKernel::kRun, [&](int e) { sum += Emission(k, e, p); });
+      ForEachEmitter(list, FlatKernel::kRun, [&](int e) { sum += Emission(k, e, p); });
       return sum;
     }
     return k.Sum(flat_lanes, list.runs, emitters, p) +
            SumMultipoles(search.multipoles(), list.multipoles, p, k.Fall().whole);
   }
-  double SumOf(const DistanceKernel& k, const NeighbourList& list, const Vec3& p,
-               std::int64_t& evaluations) const {
+  double SumEmissions(const DistanceKernel& k, const NeighbourList& list, const Vec3& p,
+                      std::int64_t& evaluations) const {
     std::int64_t reaching = 0;
     const double sum =
         SumByDistance(distance_lanes, list.runs, list.reaches, p, k.Fall(), reaching);
@@ -155,12 +158,12 @@ struct ImplicitSurface::Impl {
     return sum;
   }
 
-  // Of all emitters at p, within the tail error.
+  // The sum over all emitters at p, within the tail error.
   double Sum(const Vec3& p, std::int64_t& evaluations) const {
     return Sum(*Near(p), p, evaluations);
   }
   double Sum(const NeighbourList& list, const Vec3& p, std::int64_t& evaluations) const {
-    return std::visit([&](const auto& k) { return SumOf(k, list, p, evaluations); }, kernel);
+    return std::visit([&](const auto& k) { return SumEmissions(k, list, p, evaluations); }, kernel);
   }
 
   int RunLength() const {
@@ -172,9 +175,9 @@ struct ImplicitSurface::Impl {
   std::vector<EmitterTriangle> emitters;
   EmitterSearch search;
   NeighbourListCache neighbours;
-  std::vector<FlatEmitterLanes> flat_lanes;  // of each eight emitters; or
-  std::vector<DistanceEmitterLanes> distance_lanes;
-  std::vector<ReachBall> reach_balls;  // of the distance lanes
+  std::vector<FlatEmitterLanes> flat_lanes;          // per eight emitters, for `flat`
+  std::vector<DistanceEmitterLanes> distance_lanes;  // per eight emitters, else
+  std::vector<ReachBall> reach_balls;                // per half of distance_lanes
   double tail_error, decay;
 };
 
@@ -203,7 +206,7 @@ double ImplicitSurface::Flatten(double emission) const {
   return emission > 0 ? std::max(1 - std::pow(emission, -1 / impl_->decay), kLowest) : kLowest;
 }
 
-double ImplicitSurface::SumOf(std::span<const std::int32_t> emitters, const Vec3& p) const {
+double ImplicitSurface::SumEmissions(std::span<const std::int32_t> emitters, const Vec3& p) const {
   return std::visit(
       [&](const auto& kernel) {
         double sum = 0;
@@ -239,8 +242,8 @@ std::shared_ptr<const NeighbourList> ImplicitSurface::Gather(
   return std::make_shared<const NeighbourList>(std::move(list));
 }
 
-double ImplicitSurface::SumOf(const NeighbourList& gathered, const Vec3& p,
-                              std::int64_t& evaluations) const {
+double ImplicitSurface::SumEmissions(const NeighbourList& gathered, const Vec3& p,
+                                     std::int64_t& evaluations) const {
   return impl_->Sum(gathered, p, evaluations);
 }
 
@@ -266,7 +269,7 @@ EmissionBounds ImplicitSurface::BoundsIn(const Box3& box) const {
   double left_out = 0;
   const NeighbourList near = impl_->search.InBox(box, FarField::kNone, left_out);
   std::vector<std::int32_t> emitters;
-  impl_->ForEachOf(near, impl_->RunLength(), [&](int e) { emitters.push_back(e); });
+  impl_->ForEachEmitter(near, impl_->RunLength(), [&](int e) { emitters.push_back(e); });
   std::vector<EmissionBounds> bounds(emitters.size());
   BoundsIn(box, emitters, bounds);
   EmissionBounds sum{-impl_->tail_error, left_out + impl_->tail_error};
@@ -284,7 +287,7 @@ Box3 ImplicitSurface::InfluenceBox(std::int32_t emitter, double m) const {
   const double depth =
       std::visit([&t](const auto& kernel) { return kernel.EmittingDepth(t); }, impl_->kernel);
   const Box3 moved = box.translated(t.moved);
-  box.extend(moved);  // with the prism
+  box.extend(moved);  // includes the prism
   const Vec3 reach = Vec3::Constant(depth * std::pow(m, 1 / impl_->decay));
   return {box.min() - reach, box.max() + reach};
 }
@@ -306,7 +309,7 @@ double ImplicitSurface::MaxDepth_mm() const {
 double ImplicitSurface::EmittersPerSquareDepth() const {
   double squares = 0, area = 0;
   for (const EmitterTriangle& t : impl_->emitters) {
-    squares += t.depth_mm * t.depth_mm;  // depth^2 / area, weighted by area
+    squares += t.depth_mm * t.depth_mm;  // depth^2 / area, weighted by the area
     area += t.area_mm2;
   }
   return squares / area;

@@ -6,17 +6,18 @@
 namespace semblance {
 namespace {
 
-// With R^2 = height^2 + rho^2 the integrand is the divergence of the radial field g(rho), where
-// n rho g = height^-n - R^-n. Along an edge at distance d its flux is (J_0 / height^n - J_n) / n
-// with J_m the integral of d / (rho^2 R^m), and 1 / (rho^2 R^2) = (1 / rho^2 - 1 / R^2) / height^2
-// gives J_m = (J_{m-2} - d I_m) / height^2, I_m being the integral of R^-m. So the flux is
-// height^-n (J_0 - height^m J_m), m the parity of n, plus the sum of d I_j / height^(n-j+2).
+// With R^2 = height^2 + rho^2 the integrand is the divergence of the radial field g(rho) with n rho
+// g = height^-n - R^-n. Along an edge at distance d the flux of g is (J_0 / height^n - J_n) / n,
+// where J_m is the integral of d / (rho^2 R^m). From 1 / (rho^2 R^2) = (1 / rho^2 - 1 / R^2) /
+// height^2 follows J_m = (J_{m-2} - d I_m) / height^2, where I_m is the integral of R^-m. Hence n
+// times the flux is height^-n (J_0 - height^m J_m), with m the parity of n, plus the sum of d I_j /
+// height^(n-j+2).
 struct Edge {
   double d, t0, t1;
   double r0, r1;  // R at the ends
 };
 
-// J_0 - height J_1: the difference of two arctangents at each end, taken together.
+// J_0 - height J_1: two arctangents per end, combined into one.
 double AngleLeft(const Edge& e, double height) {
   const double x0 = e.t0 * e.d * (e.r0 - height), y0 = e.d * e.d * e.r0 + height * e.t0 * e.t0;
   const double x1 = e.t1 * e.d * (e.r1 - height), y1 = e.d * e.d * e.r1 + height * e.t1 * e.t1;
@@ -37,7 +38,7 @@ double Flux(const Edge& e, double height, int n) {
   const bool odd = (n & 1) != 0;
   const double h2 = height * height, a2 = h2 + e.d * e.d;
   const double inverse0 = 1 / (e.r0 * e.r0), inverse1 = 1 / (e.r1 * e.r1);
-  double length = FirstLength(e, a2, odd);  // I_j, from I_{j-2} by parts
+  double length = FirstLength(e, a2, odd);  // I_j from I_{j-2}, by parts
   double end0 = e.t0 * inverse0 / (odd ? e.r0 : 1), end1 = e.t1 * inverse1 / (odd ? e.r1 : 1);
   double sum = 0, power = odd ? height : 1;
   for (int j = odd ? 3 : 2; j <= n; j += 2) {

@@ -7,12 +7,12 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/hspline/bspline_basis.h"
+#include "surfaces/hspline/bspline.h"
 
 namespace semblance {
 namespace {
 
-// The patch along one direction, and the coordinate in it, 0..1.
+// The index of the patch along one direction, and the coordinate within it, 0..1.
 std::pair<int, double> PatchAlong(double x, int patches, bool closed) {
   x = IntoUnit(x, closed);
   const int patch = std::min(static_cast<int>(x * patches), patches - 1);
@@ -24,11 +24,11 @@ double Power(double x, int order) { return order == 0 ? 1 : order == 1 ? x : x *
 }  // namespace
 
 void CheckShape(const HSplineShape& shape) {
-  constexpr int kMostLevels = 8;
+  constexpr int kMaxLevels = 8;
   const int least_u = shape.ClosedU() ? 4 : 1;
-  if (shape.max_level < 0 || shape.max_level > kMostLevels) {
+  if (shape.max_level < 0 || shape.max_level > kMaxLevels) {
     throw InputError(fmt::format("H-spline: the finest level is {}; it must be in 0..{}",
-                                 shape.max_level, kMostLevels));
+                                 shape.max_level, kMaxLevels));
   }
   const int most = kMostPatches >> shape.max_level;
   if (shape.patches_u < least_u || shape.patches_v < 1 || shape.patches_u > most ||

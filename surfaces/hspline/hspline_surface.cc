@@ -3,11 +3,12 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/hspline/patch_layout.h"
+#include "surfaces/hspline/sparse_net.h"
 
 namespace semblance {
 namespace {
@@ -30,11 +31,11 @@ void CheckNet(const HSplineShape& shape, int level, const ControlNet& net) {
   }
 }
 
-// The axes, where the tangents span a plane.
+// Fills `regular` and, if the tangents span a plane, `axes`.
 void OrientFrame(const HSplineShape& shape, int level, SurfaceFrame& frame) {
   const Vec3 normal = frame.du.cross(frame.dv);
-  // Parallel tangents, judged relative to the tangents' own size, and vanishing ones, judged by
-  // what rounding leaves of differences of vertices.
+  // Tangents are parallel relative to their own length (kDegenerate). They vanish if they are no
+  // longer than the round-off in differences of vertices (kRounding).
   constexpr double kDegenerate = 1e-12, kRounding = 1e-15;
   const double noise =
       kRounding * frame.point.norm() * std::max(shape.PatchesU(level), shape.PatchesV(level));
@@ -62,13 +63,13 @@ void CheckOffset(const HSplineShape& shape, const VertexId& vertex, const Vec3& 
   }
 }
 
-// r and F of thesis 4.1 for one vertex.
+// r and F of x = r + F o for one vertex.
 struct Reference {
   Vec3 origin;
   Mat3 axes;
 };
 
-Reference ReferenceOf(const HSplineSurface& surface, const VertexId& vertex) {
+Reference FindReference(const HSplineSurface& surface, const VertexId& vertex) {
   const Vec2 uv = surface.ParameterOf(vertex);
   const SurfaceFrame frame = surface.LevelFrame(vertex.level - 1, uv);
   if (surface.shape().reference == OffsetReference::kWorld) {
@@ -98,7 +99,7 @@ HSplineSurface::HSplineSurface(const HSplineShape& shape, const ControlNet& leve
   CheckShape(shape);
   CheckNet(shape, 0, level0);
   levels_.resize(shape.max_level + 1);
-  levels_[0] = {RowTable(LayoutOf(shape, {})[0].reached, shape.patches_v),
+  levels_[0] = {RowTable(MakeLayouts(shape, {})[0].influenced, shape.patches_v),
                 SparseNet::WholeNet(level0, StoredRows(shape, 0))};
 }
 
@@ -106,8 +107,8 @@ PatchPoint HSplineSurface::FinestPatch(int level, const Vec2& uv) const {
   CheckParameter(shape_, level, uv);
   for (;; --level) {
     const PatchPoint at = PatchPointAt(shape_, level, uv);
-    if (levels_[level].reached.Find(at.patch.i, at.patch.j) >= 0) {
-      return at;  // at the latest on level 0
+    if (levels_[level].influenced.Find(at.patch.i, at.patch.j) >= 0) {
+      return at;  // level 0 holds all patches
     }
   }
 }
@@ -147,7 +148,7 @@ SurfaceFrame HSplineSurface::LevelFrame(int level, const Vec2& uv) const {
 
 ControlNet HSplineSurface::Net(int level) const {
   CheckParameter(shape_, level, Vec2::Zero());
-  int l = level;  // the finest level of which all vertices are stored
+  int l = level;  // the finest level with all vertices stored
   while (levels_[l].net.size() < static_cast<std::size_t>(Columns(l)) * StoredRows(shape_, l)) {
     --l;
   }
@@ -176,11 +177,11 @@ std::array<Vec3, 16> HSplineSurface::PatchVertices(const PatchId& patch) const {
 
 void HSplineSurface::SetNet(int level, const ControlNet& net) {
   CheckNet(shape_, level, net);
-  HSplineSurface next = *this;  // so that a failure leaves the surface as it was
+  HSplineSurface next = *this;  // so that a failure leaves this surface unchanged
   if (level == 0) {
     next.levels_[0].net = SparseNet::WholeNet(net, StoredRows(shape_, 0));
   } else {
-    for (const auto& [vertex, offset] : OffsetsThatGive(level, net)) {
+    for (const auto& [vertex, offset] : OffsetsForNet(level, net)) {
       next.offsets_[vertex] = offset;
     }
   }
@@ -188,13 +189,13 @@ void HSplineSurface::SetNet(int level, const ControlNet& net) {
   *this = std::move(next);
 }
 
-std::map<VertexId, Vec3> HSplineSurface::OffsetsThatGive(int level, const ControlNet& net) const {
+std::map<VertexId, Vec3> HSplineSurface::OffsetsForNet(int level, const ControlNet& net) const {
   const ControlNet present = Net(level);
   std::map<VertexId, Vec3> edits;
   for (int j = 0; j < net.rows; ++j) {
     for (int i = 0; i < net.columns; ++i) {
       if (net.At(i, j) != present.At(i, j)) {
-        const Reference reference = ReferenceOf(*this, {level, i, j});
+        const Reference reference = FindReference(*this, {level, i, j});
         edits[{level, i, j}] = reference.axes.transpose() * (net.At(i, j) - reference.origin);
       }
     }
@@ -215,7 +216,7 @@ void HSplineSurface::SetOffsets(const std::map<VertexId, std::optional<Vec3>>& o
   if (offsets.empty()) {
     return;
   }
-  HSplineSurface next = *this;  // so that a failure leaves the surface as it was
+  HSplineSurface next = *this;  // so that a failure leaves this surface unchanged
   for (const auto& [vertex, offset] : offsets) {
     CheckOffset(shape_, vertex, offset.value_or(Vec3::Zero()));
     next.offsets_.erase(vertex);
@@ -228,33 +229,57 @@ void HSplineSurface::SetOffsets(const std::map<VertexId, std::optional<Vec3>>& o
 }
 
 void HSplineSurface::RebuildFrom(int level) {
-  const std::vector<LevelLayout> layout = LayoutOf(shape_, offsets_);
+  const std::vector<LevelLayout> layout = MakeLayouts(shape_, offsets_);
   for (int l = 1; l <= shape_.max_level; ++l) {
-    RowTable reached(layout[l].reached, shape_.PatchesV(l)),
-        rows(VerticesOf(shape_, l, layout[l].needed), StoredRows(shape_, l));
-    if (l < level && reached == levels_[l].reached && rows == levels_[l].net.rows()) {
+    RowTable influenced(layout[l].influenced, shape_.PatchesV(l)),
+        rows(VertexSpans(shape_, l, layout[l].needed), StoredRows(shape_, l));
+    if (l < level && influenced == levels_[l].influenced && rows == levels_[l].net.rows()) {
       continue;
     }
-    SparseNet net = Refined(shape_, l - 1, levels_[l - 1].net, std::move(rows));
+    SparseNet net = RefineSparse(shape_, l - 1, levels_[l - 1].net, std::move(rows));
     for (auto it = offsets_.lower_bound({l, 0, 0}); it != offsets_.end() && it->first.level == l;
          ++it) {
-      const Reference reference = ReferenceOf(*this, it->first);
+      const Reference reference = FindReference(*this, it->first);
       const Vec3 place = reference.origin + reference.axes * it->second;
       for (int row = it->first.j; row < StoredRows(shape_, l); row += Rows(l)) {
         *net.Find(it->first.i, row) = place;
       }
     }
-    levels_[l] = {std::move(reached), std::move(net)};
+    levels_[l] = {std::move(influenced), std::move(net)};
   }
 }
 
 std::size_t HSplineSurface::Bytes() const {
-  constexpr std::size_t kNode = 96;  // of the map of offsets, with what its allocation takes
+  constexpr std::size_t kNode = 96;  // bytes per entry of the map of offsets, with its allocation
   std::size_t bytes = sizeof(*this) + kNode * offsets_.size() + levels_.capacity() * sizeof(Level);
   for (const Level& level : levels_) {
-    bytes += level.reached.Bytes() + level.net.Bytes();
+    bytes += level.influenced.Bytes() + level.net.Bytes();
   }
   return bytes;
+}
+
+std::optional<SurfaceCurvature> CurvatureAt(const HSplineSurface& surface, const Vec2& uv) {
+  const SurfaceFrame frame = surface.Frame(uv);
+  if (!frame.regular) {
+    return std::nullopt;
+  }
+  const SecondDerivatives second = surface.Second(uv);
+  const Vec3 normal = frame.Normal();
+  Eigen::Matrix2d bend;  // the second fundamental form
+  bend << normal.dot(second.duu), normal.dot(second.duv), normal.dot(second.duv),
+      normal.dot(second.dvv);
+  // Steps in (u,v) along the frame's first two axes t and s, since du = a t and dv = b t + c s.
+  const double a = frame.axes.col(0).dot(frame.du), b = frame.axes.col(0).dot(frame.dv),
+               c = frame.axes.col(1).dot(frame.dv);
+  Eigen::Matrix2d steps;
+  steps << 1 / a, -b / (a * c), 0, 1 / c;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(steps.transpose() * bend * steps);
+  SurfaceCurvature curvature;
+  curvature.smallest_per_mm = solver.eigenvalues()[0];
+  curvature.largest_per_mm = solver.eigenvalues()[1];
+  curvature.largest_direction = frame.axes.leftCols<2>() * solver.eigenvectors().col(1);
+  curvature.smallest_direction = normal.cross(curvature.largest_direction);
+  return curvature;
 }
 
 }  // namespace semblance

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The control vertices of one level, of which only some exist: per column, runs of rows. Where v is
-// closed, the first three rows follow the last one again, so that the vertices of each patch stand
-// in a row, also across the seam: there are always StoredRows(level).
+// Sparse storage of one level's control vertices: runs of rows per column. If v is closed, the
+// first three rows are stored again behind the last one, so that the four vertices of a patch's
+// column are contiguous also across the seam. A complete column has StoredRows(level) rows.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <vector>
 
 #include "surfaces/hspline/hspline_shape.h"
@@ -19,23 +20,23 @@ struct RowSpan {
   bool operator==(const RowSpan&) const = default;
 };
 
-using ColumnSpans =
-    std::vector<std::vector<RowSpan>>;  // one list per column; empty if there are none
+using ColumnSpans = std::vector<std::vector<RowSpan>>;  // one list per column; no columns at all if
+                                                        // there are no spans
 
 inline int StoredRows(const HSplineShape& shape, int level) { return shape.PatchesV(level) + 3; }
 
-// Sorts the spans and merges those that overlap or touch.
-std::vector<RowSpan> Merged(std::vector<RowSpan> spans);
+// Sorts the spans and merges spans that overlap or touch.
+std::vector<RowSpan> MergeSpans(std::vector<RowSpan> spans);
 
-// Which (i, j) of a grid exist; spans in order and apart. Memory: the spans, and four bytes per
-// column.
+// The set of existing (i, j) of a grid. The spans of a column are ascending and do not touch.
+// Memory: the spans, and four bytes per column.
 class RowTable {
  public:
   RowTable() = default;
-  // rows: of the grid, in each column.
+  // rows: the number of rows of a complete column.
   RowTable(const ColumnSpans& columns, int rows);
 
-  // The span, as an index, that holds (i, j) of the grid, or -1.
+  // The index of the span that contains (i, j), or -1.
   int Find(int i, int j) const {
     if (whole_ > 0) {
       return j < whole_ ? i : -1;
@@ -57,15 +58,15 @@ class RowTable {
     return -1;
   }
   const RowSpan& Span(int index) const { return spans_[index]; }
-  int First(int i) const { return starts_[i]; }  // the column's spans are First(i)..First(i + 1)
-  int whole() const { return whole_; }           // rows, if all of every column are there; else 0
+  int First(int i) const { return starts_[i]; }  // column i has the spans First(i)..First(i + 1)
+  int whole() const { return whole_; }  // number of rows if all columns are complete, else 0
   int columns() const { return starts_.empty() ? 0 : static_cast<int>(starts_.size()) - 1; }
 
   std::size_t Bytes() const;
   bool operator==(const RowTable&) const = default;
 
  private:
-  std::vector<std::int32_t> starts_;  // one per column and one more, or none
+  std::vector<std::int32_t> starts_;  // per column the first span, and the end; or empty
   std::vector<RowSpan> spans_;
   int whole_ = 0;
 };
@@ -73,14 +74,14 @@ class RowTable {
 class SparseNet {
  public:
   SparseNet() = default;
-  explicit SparseNet(RowTable rows);  // vertices at the origin
-  // All vertices exist.
+  explicit SparseNet(RowTable rows);  // all vertices 0
+  // A net in which all vertices exist.
   static SparseNet WholeNet(const ControlNet& net, int stored_rows);
 
   const RowTable& rows() const { return rows_; }
   std::size_t size() const { return vertices_.size(); }
 
-  // The vertices (i, j) to (i, j + count - 1) as stored, contiguous; null unless all exist.
+  // The contiguous vertices (i, j) to (i, j + count - 1); null unless all exist.
   const Vec3* Find(int i, int j, int count) const {
     if (rows_.whole() > 0) {
       return vertices_.data() + static_cast<std::size_t>(i) * rows_.whole() + j;
@@ -94,19 +95,37 @@ class SparseNet {
     return const_cast<Vec3*>(static_cast<const SparseNet*>(this)->Find(i, j, 1));
   }
 
-  // Copies the vertices that exist into a dense net of the level.
+  // Copies the existing vertices into a dense net of the level.
   void CopyTo(ControlNet& net) const;
 
   std::size_t Bytes() const;
 
  private:
   RowTable rows_;
-  std::vector<std::size_t> first_;  // per span: the index of its first vertex
+  std::vector<std::size_t> first_;  // per span the index of its first vertex
   std::vector<Vec3> vertices_;
 };
 
-// The vertices `rows` of level + 1, made from those of `level`; each needed one must exist there.
-// The same bytes as Refine.
-SparseNet Refined(const HSplineShape& shape, int level, const SparseNet& coarse, RowTable rows);
+// The vertices `rows` of level + 1 by knot insertion from `coarse`, a net of `level` in which all
+// needed vertices exist. Gives the same bytes as Refine.
+SparseNet RefineSparse(const HSplineShape& shape, int level, const SparseNet& coarse,
+                       RowTable rows);
+
+// The patches of one level that the offsets of an H-spline need.
+struct LevelLayout {
+  ColumnSpans influenced;  // patches that an offset of this level changes
+  ColumnSpans needed;      // influenced ones, and parents of needed patches of the next finer level
+};
+
+// Computes the layout of each level, 0..max_level. An offset influences 4 x 4 patches of its level,
+// fewer at an open border. All patches of level 0 count as influenced.
+std::vector<LevelLayout> MakeLayouts(const HSplineShape& shape,
+                                     const std::map<VertexId, Vec3>& offsets);
+
+// The patches of the next coarser level that contain the given patches.
+ColumnSpans ParentPatches(const ColumnSpans& patches);
+
+// The stored vertices of the given patches of a level.
+ColumnSpans VertexSpans(const HSplineShape& shape, int level, const ColumnSpans& patches);
 
 }  // namespace semblance

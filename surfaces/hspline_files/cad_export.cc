@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/hspline_files/cad_export.h"
+#include "surfaces/hspline_files/face_export.h"
 
 #include <APIHeaderSection_MakeHeader.hxx>
 #include <BRepBuilderAPI_MakeFace.hxx>
@@ -26,12 +26,12 @@
 #include <sstream>
 
 #include "surfaces/base/error.h"
-#include "surfaces/hspline/patch_regions.h"
+#include "surfaces/hspline/patch_tree.h"
 
 namespace semblance {
 namespace {
 
-// OpenCASCADE tells its progress to everyone; a library does not print.
+// Suppresses OpenCASCADE's messages, because a library does not print.
 class Silence {
  public:
   Silence() : printers_(Message::DefaultMessenger()->Printers()) {
@@ -45,7 +45,7 @@ class Silence {
   Message_SequenceOfPrinters printers_;
 };
 
-// Uniform knots (first - 3 .. first + count + 3) / patches, all simple.
+// The simple knots (first - 3 .. first + count + 3) / patches.
 TColStd_Array1OfReal UniformKnots(int first, int count, int patches) {
   TColStd_Array1OfReal knots(1, count + 7);
   for (int k = 0; k < count + 7; ++k) {
@@ -71,13 +71,13 @@ Handle(Geom_BSplineSurface)
   const Handle(Geom_BSplineSurface) spline =
       new Geom_BSplineSurface(poles, UniformKnots(region.i, region.columns, m),
                               UniformKnots(region.j, region.rows, n), once_u, once_v, 3, 3);
-  // Knots are inserted until the surface ends where its knots do: what every CAD program reads.
+  // Inserts knots until the surface is clamped at its ends, which every CAD program can read.
   spline->Segment(double(region.i) / m, double(region.i + region.columns) / m, double(region.j) / n,
                   double(region.j + region.rows) / n);
   return spline;
 }
 
-// One shell, so that it is one part, not an assembly of as many as there are faces.
+// Puts all faces into one shell, so that CAD programs show one part and not an assembly.
 TopoDS_Shell Faces(const HSplineSurface& surface) {
   constexpr double kTolerance_mm = 1e-7;
   const BRep_Builder builder;
@@ -97,7 +97,7 @@ Handle(TCollection_HAsciiString) Text(const char* text) {
   return new TCollection_HAsciiString(text);
 }
 
-// What OpenCASCADE would fill with the time and with how much it wrote before.
+// Sets the fields that OpenCASCADE would fill with the time and a counter.
 void SetNames(const Handle(StepData_StepModel) & model) {
   APIHeaderSection_MakeHeader header(model);
   header.SetName(Text("face"));
@@ -120,7 +120,7 @@ std::string SurfaceToStep(const HSplineSurface& surface) {
   STEPControl_Writer writer;
   Interface_Static::SetCVal("write.step.unit", "MM");
   if (writer.Transfer(Faces(surface), STEPControl_ShellBasedSurfaceModel) != IFSelect_RetDone) {
-    throw InputError("STEP: OpenCASCADE could not take the surface over");
+    throw InputError("STEP: OpenCASCADE could not convert the surface");
   }
   const Handle(StepData_StepModel) model = writer.Model();
   SetNames(model);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The build without OpenCASCADE: CMake compiles this file or cad_export.cc, so that neither needs
-// conditional code.
+// The build without OpenCASCADE. CMake compiles either this file or cad_export.cc, so that neither
+// needs conditional code.
 #include "surfaces/base/error.h"
-#include "surfaces/hspline_files/cad_export.h"
+#include "surfaces/hspline_files/face_export.h"
 
 namespace semblance {
 namespace {
@@ -10,7 +10,7 @@ namespace {
 std::string Refuse(const char* format) {
   throw InputError(
       std::string(format) +
-      ": this build cannot write it; install libocct-data-exchange-dev, then configure "
+      ": this build cannot write this format; install libocct-data-exchange-dev, then configure "
       "with -DSEMBLANCE_WITH_CAD=ON and build again");
 }
 

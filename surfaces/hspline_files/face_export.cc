@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <array>
+#include <iterator>
 #include <set>
 #include <utility>
 #include <vector>
@@ -10,15 +12,59 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 #include "surfaces/base/parallel.h"
-#include "surfaces/hspline_files/cad_export.h"
-#include "surfaces/hspline_files/surface_export.h"
-#include "surfaces/hspline_query/adaptive_tessellation.h"
-#include "surfaces/hspline_query/curvature.h"
+#include "surfaces/hspline/patch_tree.h"
+#include "surfaces/hspline_query/tessellate.h"
+#include "surfaces/mesh_files/glb.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/vtk_xml.h"
 
 namespace semblance {
 namespace {
+
+constexpr int kLagrangeQuadrilateral = 70;  // VTK's cell type
+
+// Weights of the control vertices of a uniform cubic B-spline for its points at the parameters 0,
+// 1/3, 2/3 and 1 of a patch, along one direction. Four points determine a cubic.
+constexpr double kLagrange[4][4] = {{1.0 / 6, 4.0 / 6, 1.0 / 6, 0},
+                                    {8.0 / 162, 93.0 / 162, 60.0 / 162, 1.0 / 162},
+                                    {1.0 / 162, 60.0 / 162, 93.0 / 162, 8.0 / 162},
+                                    {0, 1.0 / 6, 4.0 / 6, 1.0 / 6}};
+
+// VTK's order of the sixteen points a + 4 b: the corners counter-clockwise, the edges (lower,
+// right, upper, left, each along growing parameters), and the inner points row by row.
+constexpr int kVtkOrder[16] = {0, 3, 15, 12, 1, 2, 7, 11, 13, 14, 4, 8, 5, 6, 9, 10};
+
+std::array<Vec3, 16> PatchPoints(const std::array<Vec3, 16>& vertices) {
+  std::array<Vec3, 16> points;
+  for (int k = 0; k < 16; ++k) {
+    points[k] = Vec3::Zero();
+    for (int m = 0; m < 16; ++m) {
+      points[k] += kLagrange[k % 4][m % 4] * kLagrange[k / 4][m / 4] * vertices[m];
+    }
+  }
+  return points;
+}
+
+// Appends an array in VTK's XML; `value(k)` is the text of entry k.
+template <class Value>
+void AppendArray(std::string& text, const char* attributes, std::size_t count, const Value& value) {
+  fmt::format_to(std::back_inserter(text), "<DataArray {} format=\"ascii\">\n", attributes);
+  for (std::size_t k = 0; k < count; ++k) {
+    text += value(k);
+    text += '\n';
+  }
+  text += "</DataArray>\n";
+}
+
+std::string PatchPointsText(const HSplineSurface& surface, const PatchId& patch) {
+  const std::array<Vec3, 16> points = PatchPoints(surface.PatchVertices(patch));
+  std::string text;
+  for (const int k : kVtkOrder) {
+    fmt::format_to(std::back_inserter(text), "{} {} {} ", points[k].x(), points[k].y(),
+                   points[k].z());
+  }
+  return text;
+}
 
 std::string ExactBytes(const HSplineSurface& surface, const std::string& extension) {
   if (extension == ".vtu") {
@@ -28,7 +74,7 @@ std::string ExactBytes(const HSplineSurface& surface, const std::string& extensi
                                                      : SurfaceToIges(surface);
 }
 
-// The curvatures of the surface itself at each vertex; NaN where it has none.
+// The surface's curvatures at each vertex; NaN where they do not exist.
 std::vector<VertexScalar> CurvatureScalars(const HSplineSurface& surface,
                                            const std::vector<Vec2>& uv, int threads) {
   std::vector<double> mean(uv.size(), kNaN), gaussian(uv.size(), kNaN);
@@ -70,7 +116,7 @@ std::string EncodeFace(const HSplineSurface& surface, const std::string& given,
   if (exact.contains(extension)) {
     if (chord_mm) {
       throw InputError(
-          fmt::format("export: {} holds the exact surface; leave the chord error of {} mm away",
+          fmt::format("export: {} holds the exact surface; remove the chord error of {} mm",
                       extension, *chord_mm));
     }
     return ExactBytes(surface, extension);
@@ -83,6 +129,52 @@ std::string EncodeFace(const HSplineSurface& surface, const std::string& given,
   }
   constexpr double kChord_mm = 0.1;
   return TriangleBytes(surface, extension, chord_mm.value_or(kChord_mm), threads);
+}
+
+std::string SurfaceToVtu(const HSplineSurface& surface) {
+  const PatchTree tree(surface);
+  const std::vector<PatchId>& patches = tree.leaves();
+  const std::size_t count = patches.size();
+  std::string text = fmt::format(
+      "<?xml version=\"1.0\"?>\n"
+      "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"LittleEndian\" "
+      "header_type=\"UInt64\">\n<UnstructuredGrid>\n"
+      "<Piece NumberOfPoints=\"{}\" NumberOfCells=\"{}\">\n<Points>\n",
+      16 * count, count);
+  AppendArray(text, "type=\"Float64\" NumberOfComponents=\"3\"", count,
+              [&](std::size_t k) { return PatchPointsText(surface, patches[k]); });
+  text += "</Points>\n<Cells>\n";
+  AppendArray(text, "type=\"Int64\" Name=\"connectivity\"", 16 * count,
+              [](std::size_t k) { return fmt::format("{}", k); });
+  AppendArray(text, "type=\"Int64\" Name=\"offsets\"", count,
+              [](std::size_t k) { return fmt::format("{}", 16 * (k + 1)); });
+  AppendArray(text, "type=\"UInt8\" Name=\"types\"", count,
+              [](std::size_t) { return fmt::format("{}", kLagrangeQuadrilateral); });
+  text += "</Cells>\n<CellData>\n";
+  AppendArray(text, "type=\"Int32\" Name=\"level\"", count,
+              [&](std::size_t k) { return fmt::format("{}", patches[k].level); });
+  return text + "</CellData>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+}
+
+std::string TessellationToGlb(const Tessellation& tessellation) {
+  const TriMesh& mesh = tessellation.mesh;
+  if (mesh.triangles.empty() || tessellation.normals.size() != mesh.points.size()) {
+    throw InputError(fmt::format(
+        "glTF: {} triangles, {} points and {} normals; at least one triangle and one normal per "
+        "point are needed",
+        mesh.triangles.size(), mesh.points.size(), tessellation.normals.size()));
+  }
+  const std::vector<Vec3> of_triangles = VertexNormals(mesh);
+  std::vector<Vec3> normals = tessellation.normals;
+  for (std::size_t k = 0; k < normals.size(); ++k) {
+    normals[k] = normals[k].isZero() ? of_triangles[k] : normals[k];
+  }
+  const GlbNode face{.name = "face",
+                     .parts = {{.material = {.name = "skin", .colour = {0.85, 0.65, 0.54}},
+                                .points = mesh.points,
+                                .normals = std::move(normals),
+                                .triangles = mesh.triangles}}};
+  return EncodeGlb({&face, 1});
 }
 
 }  // namespace semblance

@@ -16,16 +16,17 @@ namespace semblance {
 namespace {
 
 using Polynomial = HSplineBatch::Polynomial;
-using Vec4 = double __attribute__((vector_size(32)));  // x, y, z and nothing, in one register
+using Vec4 = double __attribute__((vector_size(32)));  // x, y, z and an unused lane, in one
+                                                       // register
 
-constexpr std::size_t kChunk = 16384;  // (u,v) to one thread
+constexpr std::size_t kChunk = 16384;  // (u,v) per task of a thread
 constexpr std::size_t kBlock = 256;    // (u,v) whose leaves are looked up together
 
-// A batch of the questions, and where its answers go.
+// A block of (u,v), and the destination of its results.
 struct Batch {
   const Polynomial* polynomials;  // one per leaf
   const std::int32_t* leaves;     // one per (u,v)
-  const Vec2* uv;                 // in the domain
+  const Vec2* uv;                 // within the domain
   std::size_t count;
   Vec3* points;
   Vec3* normals;
@@ -43,19 +44,20 @@ struct Batch {
   out[2] = v[2];
 }
 
-struct Row {  // along s, of one power of t
+struct Row {  // coefficient of one power of t, and its derivative along s
   Vec4 value, slope;
 };
 
-[[gnu::always_inline]] inline Vec4 ValueOf(const Polynomial& p, int b, double s) {
+[[gnu::always_inline]] inline Vec4 RowValue(const Polynomial& p, int b, double s) {
   return ((Load(p, 4 * b + 3) * s + Load(p, 4 * b + 2)) * s + Load(p, 4 * b + 1)) * s +
          Load(p, 4 * b);
 }
 
-[[gnu::always_inline]] inline Row RowOf(const Polynomial& p, int b, double s) {
+[[gnu::always_inline]] inline Row RowWithSlope(const Polynomial& p, int b, double s) {
   const Vec4 c0 = Load(p, 4 * b), c1 = Load(p, 4 * b + 1), c2 = Load(p, 4 * b + 2),
              c3 = Load(p, 4 * b + 3);
-  const Vec4 high = c3 * s + c2, middle = high * s + c1;  // the slope is Horner's of these sums
+  const Vec4 high = c3 * s + c2, middle = high * s + c1;  // Horner's intermediate sums also give
+                                                          // the slope
   return {middle * s + c0, (c3 * s + high) * s + middle};
 }
 
@@ -77,21 +79,22 @@ SEMBLANCE_WIDE_256 void EvaluatePoints(const Batch& batch) {
     const Polynomial& p = batch.polynomials[batch.leaves[k]];
     const double s = batch.uv[k][0] * p.scale_u - p.first_u,
                  t = batch.uv[k][1] * p.scale_v - p.first_v;
-    const Vec4 point =
-        ((ValueOf(p, 3, s) * t + ValueOf(p, 2, s)) * t + ValueOf(p, 1, s)) * t + ValueOf(p, 0, s);
+    const Vec4 point = ((RowValue(p, 3, s) * t + RowValue(p, 2, s)) * t + RowValue(p, 1, s)) * t +
+                       RowValue(p, 0, s);
     Store(point, batch.points[k]);
   }
 }
 
-// Returns how many points have no normal.
+// Returns the number of points without a normal.
 SEMBLANCE_WIDE_256 std::int64_t EvaluateNormals(const Batch& batch) {
   std::int64_t degenerate = 0;
-  constexpr double kDegenerate = 1e-12;  // as HSplineSurface::Frame judges
+  constexpr double kDegenerate = 1e-12;  // as in HSplineSurface::Frame; round-off
   for (std::size_t k = 0; k < batch.count; ++k) {
     const Polynomial& p = batch.polynomials[batch.leaves[k]];
     const double s = batch.uv[k][0] * p.scale_u - p.first_u,
                  t = batch.uv[k][1] * p.scale_v - p.first_v;
-    const Row r0 = RowOf(p, 0, s), r1 = RowOf(p, 1, s), r2 = RowOf(p, 2, s), r3 = RowOf(p, 3, s);
+    const Row r0 = RowWithSlope(p, 0, s), r1 = RowWithSlope(p, 1, s), r2 = RowWithSlope(p, 2, s),
+              r3 = RowWithSlope(p, 3, s);
     const Vec4 high = r3.value * t + r2.value, middle = high * t + r1.value;
     const Vec4 du = p.scale_u * (((r3.slope * t + r2.slope) * t + r1.slope) * t + r0.slope);
     const Vec4 dv = p.scale_v * ((r3.value * t + high) * t + middle);
@@ -105,13 +108,14 @@ SEMBLANCE_WIDE_256 std::int64_t EvaluateNormals(const Batch& batch) {
   return degenerate;
 }
 
-// Coefficients of the four uniform B-splines on a patch: kPower[a][k] of t^a in that of vertex k.
+// The four uniform B-splines of a patch in the power basis: kPower[a][k] is the coefficient of t^a
+// in the weight of vertex k.
 constexpr double kPower[4][4] = {{1.0 / 6, 4.0 / 6, 1.0 / 6, 0},
                                  {-0.5, 0, 0.5, 0},
                                  {0.5, -1, 0.5, 0},
                                  {-1.0 / 6, 0.5, -0.5, 1.0 / 6}};
 
-Polynomial PolynomialOf(const HSplineSurface& surface, const PatchId& patch) {
+Polynomial MakePolynomial(const HSplineSurface& surface, const PatchId& patch) {
   const std::array<Vec3, 16> vertices = surface.PatchVertices(patch);
   Polynomial polynomial{};
   for (int k = 0; k < 256; ++k) {
@@ -121,7 +125,7 @@ Polynomial PolynomialOf(const HSplineSurface& surface, const PatchId& patch) {
           kPower[a][m] * kPower[b][n] * (vertices[m + 4 * n][d] - vertices[0][d]);
     }
   }
-  for (int d = 0; d < 3; ++d) {  // added last, so that tangents do not suffer its rounding
+  for (int d = 0; d < 3; ++d) {  // added last, so that its round-off does not reach the tangents
     polynomial.power[0][d] += vertices[0][d];
   }
   polynomial.scale_u = surface.shape().PatchesU(patch.level);
@@ -147,7 +151,7 @@ void CheckFinite(std::span<const Vec2> uv) {
 HSplineBatch::HSplineBatch(const HSplineSurface& surface) : tree_(surface) {
   polynomials_.reserve(tree_.leaves().size());
   for (const PatchId& patch : tree_.leaves()) {
-    polynomials_.push_back(PolynomialOf(surface, patch));
+    polynomials_.push_back(MakePolynomial(surface, patch));
   }
 }
 
@@ -159,7 +163,7 @@ void HSplineBatch::Sample(std::span<const Vec2> uv, int threads, Vec3* points, V
                           std::int64_t* degenerate) const {
   CheckFinite(uv);
   const std::size_t chunks = (uv.size() + kChunk - 1) / kChunk;
-  std::vector<std::int64_t> zero(chunks, 0);  // normals, by chunk
+  std::vector<std::int64_t> zero(chunks, 0);  // zero normals per chunk
   ParallelFor(chunks, threads, 1, [&](std::size_t c) {
     std::array<std::int32_t, kBlock> leaves;
     std::array<Vec2, kBlock> inside;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Many points and normals of an H-spline at once.
+// Evaluates many points and normals of an H-spline at once.
 #pragma once
 
 #include <cstdint>
@@ -12,30 +12,31 @@ namespace semblance {
 
 struct SurfaceSamples {
   std::vector<Vec3> points;     // mm
-  std::vector<Vec3> normals;    // unit, of du x dv; zero where the tangents vanish or are parallel
-  std::int64_t degenerate = 0;  // how many normals are zero
+  std::vector<Vec3> normals;    // unit, du x dv; zero where the tangents vanish or are parallel
+  std::int64_t degenerate = 0;  // number of zero normals
 };
 
-// Keeps the polynomials of the surface's patches as they are now; it does not see later changes.
-// Memory grows with the detail, not with the finest level.
+// Stores one polynomial per leaf of the surface's PatchTree, so that memory grows with the detail
+// and not with the finest level. Later changes of the surface have no effect.
 class HSplineBatch {
  public:
   explicit HSplineBatch(const HSplineSurface& surface);
 
-  // One per (u,v), which is clamped or wrapped as in StencilAt. Equal to HSplineSurface::Point and
-  // Normal up to rounding; no byte depends on `threads` (>= 1). Throws InputError for a (u,v) that
-  // is not finite.
+  // Evaluates one result per (u,v), with uv as in PatchPointAt. Equals HSplineSurface::Point and
+  // Normal up to round-off. The result does not depend on `threads` (>= 1). Throws InputError for a
+  // (u,v) that is not finite.
   std::vector<Vec3> Points(std::span<const Vec2> uv, int threads = 1) const;
   SurfaceSamples PointsAndNormals(std::span<const Vec2> uv, int threads = 1) const;
-  // The same into `samples`, reusing its memory.
+  // Writes the same to `samples` and reuses its memory.
   void PointsAndNormals(std::span<const Vec2> uv, int threads, SurfaceSamples& samples) const;
 
-  std::size_t Bytes() const;  // of memory held
+  std::size_t Bytes() const;  // memory in use
 
-  // S(s,t) = sum of power[a + 4 b] s^a t^b, s and t in [0,1] on the patch; x, y, z and a zero.
+  // The surface on one patch in the power basis: S(s,t) = sum_{a,b} power[a + 4 b] s^a t^b, with s
+  // and t in [0,1]. The columns of `power` are x, y, z and a zero.
   struct alignas(64) Polynomial {
     double power[16][4];
-    double scale_u, scale_v;  // s = u * scale_u - first_u, t likewise
+    double scale_u, scale_v;  // s = u * scale_u - first_u; the same for t
     double first_u, first_v;
   };
 

@@ -33,7 +33,7 @@ void CheckPoint(const Vec3& point) {
   }
 }
 
-// Below 1 along a closed direction, where rounding may give 1.
+// Brings x into the domain. Along a closed direction round-off may give 1, which becomes 0.
 double IntoDomain(double x, bool closed) {
   const double inside = IntoUnit(x, closed);
   return closed && !(inside < 1) ? 0 : inside;
@@ -43,11 +43,11 @@ Vec2 IntoDomain(const HSplineShape& shape, const Vec2& uv) {
   return {IntoDomain(uv.x(), shape.ClosedU()), std::clamp(uv.y(), 0.0, 1.0)};
 }
 
-// Half the squared distance at one (u,v), with what a step needs to know.
+// Half the squared distance at one (u,v), with its first and second derivatives.
 struct Slope {
   Vec3 residual;
   Mat2 squares;   // J^T J
-  Mat2 hessian;   // with the surface's curvature
+  Mat2 hessian;   // J^T J plus the curvature terms
   Vec2 gradient;  // per unit of u and v
   double Value() const { return residual.squaredNorm() / 2; }
 };
@@ -68,7 +68,7 @@ Slope SlopeAt(const HSplineSurface& surface, const Vec3& point, const Vec2& uv) 
   return s;
 }
 
-// Borders that the gradient presses against: these coordinates stay.
+// Fixes the coordinates whose negative gradient points out of the domain at a border.
 void HoldBorders(const HSplineShape& shape, const Vec2& uv, Slope& s) {
   for (int k = 0; k < 2; ++k) {
     const bool has_border = k == 1 || !shape.ClosedU();
@@ -85,8 +85,9 @@ void HoldBorders(const HSplineShape& shape, const Vec2& uv, Slope& s) {
   }
 }
 
-// Newton's step, or Gauss and Newton's, slightly damped, where the distance is not convex.
-Vec2 StepOf(const Slope& s) {
+// Newton's step, or a slightly damped Gauss-Newton step if the distance is not convex. Both
+// thresholds guard against round-off only.
+Vec2 NewtonStep(const Slope& s) {
   const Eigen::LLT<Mat2> newton(s.hessian);
   const double trace = s.squares.trace();
   const bool convex =
@@ -103,10 +104,11 @@ Vec2 DiagonalStep(const Slope& s) {
   return (diagonal.array() > 0).select(-s.gradient.cwiseQuotient(diagonal), Vec2::Zero());
 }
 
-// The first of the halved steps that shortens the distance enough (Armijo), or `uv` if none does.
+// Halves the step until the distance decreases enough (Armijo), and returns the new (u,v), or `uv`
+// if no step does. 1e-4 is the usual value (Nocedal & Wright 2006).
 Vec2 Backtrack(const HSplineSurface& surface, const Vec3& point, const Vec2& uv, const Slope& s,
                const Vec2& step) {
-  // What rounding of the surface's point may add to the value.
+  // The most that round-off in the surface's point may add to the value.
   const double slack = 16 * std::numeric_limits<double>::epsilon() * s.residual.norm() *
                        (s.residual.norm() + point.norm());
   for (double a = 1; a > 1e-9; a /= 2) {
@@ -124,15 +126,15 @@ Vec2 Backtrack(const HSplineSurface& surface, const Vec3& point, const Vec2& uv,
   return uv;
 }
 
-double LengthOf(const Vec2& step, const Mat2& squares) {
+double StepLength(const Vec2& step, const Mat2& squares) {
   return std::sqrt(std::max(0.0, step.dot(squares * step)));
 }
 
 int GridLevel(const HSplineSurface& surface) {
-  constexpr int kMostPatches = 65536;
+  constexpr int kMaxSamplePatches = 65536;
   const HSplineShape& shape = surface.shape();
   int level = surface.Offsets().empty() ? 0 : surface.Offsets().rbegin()->first.level;
-  while (level > 0 && shape.PatchesU(level) * shape.PatchesV(level) > kMostPatches) {
+  while (level > 0 && shape.PatchesU(level) * shape.PatchesV(level) > kMaxSamplePatches) {
     --level;
   }
   return level;
@@ -150,12 +152,13 @@ SurfaceProjection ProjectFrom(const HSplineSurface& surface, const Vec3& point, 
        ++result.iterations) {
     Slope s = SlopeAt(surface, point, result.uv);
     HoldBorders(surface.shape(), result.uv, s);
-    const Vec2 step = StepOf(s);
+    const Vec2 step = NewtonStep(s);
     Vec2 next = Backtrack(surface, point, result.uv, s, step);
-    if (next == result.uv) {  // a border has turned the step uphill; along the gradient it cannot
+    if (next == result.uv) {  // a border turned the step uphill, which it cannot do to a gradient
+                              // step
       next = Backtrack(surface, point, result.uv, s, DiagonalStep(s));
     }
-    result.converged = LengthOf(step, s.squares) <= options.tolerance_mm;
+    result.converged = StepLength(step, s.squares) <= options.tolerance_mm;
     if (next == result.uv) {
       break;
     }

@@ -12,30 +12,28 @@
 #include <utility>
 #include <vector>
 
-#include "surfaces/implicit/emitter_cache.h"
-#include "surfaces/marching/slice_marching_cubes.h"
+#include "surfaces/marching/edge_intersections.h"
 
 namespace semblance {
 namespace {
 
-constexpr double kSumRounding = 1e-9;  // share by which sums in two orders may differ
+constexpr double kSumRounding = 1e-9;  // relative round-off between two orders of a sum
 
 using Emitters = std::vector<std::int32_t>;
 
-// The emitters that a volume has to sum, ascending, and the most that all others together add in
-// it.
+// The emitters to sum in a volume (ascending), and an upper bound of the sum of all others in it.
 struct Influence {
   Emitters emitters;
   double slack = 0;
 };
 
-// A cube of cells, 2^depth along the grid's longest side, aligned with the grid's cells.
+// A cube of grid cells. A node of depth d has 1 / 2^d of the root's side.
 struct Node {
   GridIndex low{};
   int size = 0;  // cells, a power of 2
   Influence influence;
-  bool empty = false;    // proven: no surface
-  bool divided = false;  // else a leaf
+  bool empty = false;    // proven to contain no surface
+  bool divided = false;  // has children; otherwise it is a leaf
   std::array<std::unique_ptr<Node>, 8> children;
 
   GridIndex Corner(int c) const {
@@ -43,13 +41,13 @@ struct Node {
   }
 };
 
-// Cells along the root's side.
+// Cells along the root's side, a power of 2.
 int RootSize(const SampleGrid& grid) {
   const int cells = *std::max_element(grid.counts.begin(), grid.counts.end()) - 1;
   return static_cast<int>(std::bit_ceil(static_cast<unsigned>(cells)));
 }
 
-// Single emitters at corners of the octree, from the cache if there is one.
+// Evaluates single emitters at corners of the octree, with the cache if requested.
 class CornerEmissions {
  public:
   CornerEmissions(const ImplicitSurface& surface, const SampleGrid& grid, bool cached)
@@ -76,7 +74,7 @@ class CornerEmissions {
   std::optional<EmitterCache> cache_;
 };
 
-// How the two octrees choose what a node lists and whether it is divided.
+// The rules by which the two octrees list a node's emitters and decide on its division.
 class McRule {
  public:
   McRule(const McOctree& octree, const ImplicitSurface& surface) : surface_(surface) {
@@ -135,7 +133,7 @@ class MinMaxRule {
     return most + surface_.TailError() > 1 && least - surface_.TailError() < 1;
   }
 
-  // Lists the emitters that give enough, and returns their bounds.
+  // Lists the emitters with enough emission in the node and returns their bounds.
   std::vector<EmissionBounds> List(const Influence& parent,
                                    const std::vector<EmissionBounds>& bounds,
                                    Influence& influence) const {
@@ -152,8 +150,8 @@ class MinMaxRule {
     return listed;
   }
 
-  // The least sum in the node where the least of each emitter that allows it is taken at one of the
-  // node's corners (thesis 3.2.3).
+  // A lower bound of the sum in the node, from each emitter's smallest value at the node's corners
+  // if its minimum is at a corner (thesis 3.2.3).
   double LeastByCorners(const Node& node, const std::vector<EmissionBounds>& bounds,
                         CornerEmissions& corners, PolygonizeSummary& summary) const {
     Emitters at_corner;
@@ -180,8 +178,8 @@ class MinMaxRule {
   const ImplicitSurface& surface_;
 };
 
-// The octree as far as it meets the slice at hand: nodes are made when the march comes to them and
-// freed when it has passed (thesis 3.2.2).
+// The part of the octree that meets the current slice. Nodes are created when the march reaches
+// them and freed when it has passed them (thesis 3.2.2).
 template <class Rule>
 class Octree {
  public:
@@ -192,17 +190,17 @@ class Octree {
     Influence all;
     all.emitters.resize(surface.EmitterCount());
     std::iota(all.emitters.begin(), all.emitters.end(), 0);
-    rule_.Set(root_, all, BoxOf(root_), corners_, summary_);
+    rule_.Set(root_, all, NodeBox(root_), corners_, summary_);
   }
 
-  // Calls visit(leaf) for each leaf that meets slice k and is not empty. k must not fall.
+  // Calls visit(leaf) for each non-empty leaf that meets slice k. k must not decrease.
   template <class Visit>
   void ForEachLeaf(int k, const Visit& visit) {
     Descend(root_, k, visit);
   }
 
  private:
-  Box3 BoxOf(const Node& node) const {
+  Box3 NodeBox(const Node& node) const {
     return {grid_.Corner(node.Corner(0)), grid_.Corner(node.Corner(7))};
   }
 
@@ -220,7 +218,7 @@ class Octree {
         child->low[axis] = node.low[axis] + (c >> axis & 1) * child->size;
       }
       if (InGrid(*child)) {
-        rule_.Set(*child, node.influence, BoxOf(*child), corners_, summary_);
+        rule_.Set(*child, node.influence, NodeBox(*child), corners_, summary_);
       } else {
         child->empty = true;
       }
@@ -253,7 +251,7 @@ class Octree {
   Node root_;
 };
 
-// The field from a leaf's list, where that decides the sign; else the field itself.
+// The field from a leaf's listed emitters if they determine the sign, otherwise the field itself.
 class ListedField {
  public:
   ListedField(const ImplicitSurface& surface, const SampleGrid& grid, const Influence& influence,
@@ -270,10 +268,10 @@ class ListedField {
 
   double At(const Vec3& p) const {
     if (gathered_) {
-      return Decide(surface_.SumOf(*gathered_, p, summary_.emitter_evaluations), p);
+      return Decide(surface_.SumEmissions(*gathered_, p, summary_.emitter_evaluations), p);
     }
     summary_.emitter_evaluations += std::ssize(influence_.emitters);
-    return Decide(surface_.SumOf(influence_.emitters, p), p);
+    return Decide(surface_.SumEmissions(influence_.emitters, p), p);
   }
 
   double AtCorner(const GridIndex& corner) const {
@@ -287,7 +285,8 @@ class ListedField {
   }
 
  private:
-  // From the sum of the listed emitters, and perhaps of others that count in the slack too.
+  // Uses the sum of the listed emitters (and perhaps of some that are also counted in the slack) if
+  // it determines the sign.
   double Decide(double sum, const Vec3& p) const {
     const double share = surface_.SumShare() + kSumRounding;
     const bool inside = (1 - share) * sum - surface_.TailError() > 1;
@@ -301,7 +300,7 @@ class ListedField {
   const Influence& influence_;
   CornerEmissions& corners_;
   PolygonizeSummary& summary_;
-  std::shared_ptr<const NeighbourList> gathered_;  // where sums are in lanes
+  std::shared_ptr<const NeighbourList> gathered_;  // set for ListSums::kLanes
 };
 
 class LeafMarch {
@@ -316,7 +315,7 @@ class LeafMarch {
         corners_(corners),
         march_(march) {}
 
-  // The cells of a leaf in the slice at hand.
+  // Marches through the leaf's cells in the current slice.
   void operator()(const Node& leaf) const {
     const ListedField field(surface_, grid_, leaf.influence, sums_, corners_, march_.Summary());
     const auto value = [&](const GridIndex& corner) { return field.AtCorner(corner); };
@@ -330,9 +329,9 @@ class LeafMarch {
 
  private:
   void Search(const ListedField& field, CrossedEdge& edge) const {
-    const EdgeLine line = LineOf(grid_, edge);
+    const EdgeLine line = MakeEdgeLine(grid_, edge);
     std::int64_t& evaluations = march_.Summary().edge_evaluations;
-    if (options_.method == EdgeSearch::kBisection) {  // asks for signs alone
+    if (options_.method == EdgeSearch::kBisection) {  // needs only signs
       edge.at = SearchCrossing(
           edge.from, edge.to, options_, [&](double t) { return field.At(line.At(t)); },
           evaluations);
@@ -363,13 +362,82 @@ PolygonizeResult March(const Rule& rule, ListSums sums, bool cached, const Impli
   for (int k = 0; k + 1 < grid.counts[2]; ++k) {
     context.ThrowIfStopped();
     context.Report("polygonize", {}, static_cast<double>(k) / grid.counts[2]);
-    march.GoUp();
+    march.NextLayer();
     octree.ForEachLeaf(k, LeafMarch(surface, grid, options, sums, corners, march));
   }
-  return MeshOf(grid, march.Take());
+  return BuildMesh(grid, march.Take());
 }
 
 }  // namespace
+
+EmitterCache::EmitterCache(const ImplicitSurface& surface, const SampleGrid& grid, int size)
+    : surface_(surface),
+      grid_(grid),
+      size_(size),
+      depths_(std::countr_zero(static_cast<unsigned>(size))),
+      layers_(depths_ + 2) {}
+
+EmitterCache::Kept& EmitterCache::At(const GridIndex& corner) {
+  const int k = corner[2];
+  Layer& layer =
+      k == 0 ? layers_.back() : layers_[depths_ - std::countr_zero(static_cast<unsigned>(k))];
+  if (layer.k != k) {
+    layer.k = k;
+    layer.corners.clear();
+  }
+  return layer.corners[corner[0] + std::int64_t{size_ + 1} * corner[1]];
+}
+
+void EmitterCache::Get(const GridIndex& corner, std::span<const std::int32_t> emitters,
+                       std::span<double> values, std::int64_t& evaluations) {
+  Kept& kept = At(corner);
+  Kept fresh;
+  std::vector<std::size_t> missing;  // indices into `emitters`
+  std::size_t next = 0;              // index into kept.emitters
+  for (std::size_t n = 0; n < emitters.size(); ++n) {
+    while (next < kept.emitters.size() && kept.emitters[next] < emitters[n]) {
+      ++next;
+    }
+    if (next < kept.emitters.size() && kept.emitters[next] == emitters[n]) {
+      values[n] = kept.values[next];
+    } else {
+      missing.push_back(n);
+      fresh.emitters.push_back(emitters[n]);
+    }
+  }
+  if (missing.empty()) {
+    return;
+  }
+  fresh.values.resize(missing.size());
+  surface_.EmissionsAt(grid_.Corner(corner), fresh.emitters, fresh.values);
+  evaluations += std::ssize(missing);
+  for (std::size_t m = 0; m < missing.size(); ++m) {
+    values[missing[m]] = fresh.values[m];
+  }
+  Insert(fresh, kept);
+}
+
+void EmitterCache::Insert(const Kept& fresh, Kept& kept) const {
+  Kept both;
+  both.emitters.reserve(kept.emitters.size() + fresh.emitters.size());
+  both.values.reserve(both.emitters.capacity());
+  std::size_t next = 0;  // index into fresh.emitters
+  const auto append_fresh = [&] {
+    both.emitters.push_back(fresh.emitters[next]);
+    both.values.push_back(fresh.values[next++]);
+  };
+  for (std::size_t n = 0; n < kept.emitters.size(); ++n) {
+    while (next < fresh.emitters.size() && fresh.emitters[next] < kept.emitters[n]) {
+      append_fresh();
+    }
+    both.emitters.push_back(kept.emitters[n]);
+    both.values.push_back(kept.values[n]);
+  }
+  while (next < fresh.emitters.size()) {
+    append_fresh();
+  }
+  kept = std::move(both);
+}
 
 PolygonizeResult MarchOctree(const McOctree& octree, const ImplicitSurface& surface,
                              const SampleGrid& grid, const EdgeSearchOptions& options,

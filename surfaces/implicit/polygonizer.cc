@@ -10,9 +10,9 @@
 namespace semblance {
 namespace {
 
-// Runs polygonize(field) and adds how many emitters the field took.
+// Runs polygonize(field) and counts the emitters that the field evaluates.
 template <class Polygonize>
-PolygonizeResult Counted(const ImplicitSurface& surface, const Polygonize& polygonize) {
+PolygonizeResult CountEmitters(const ImplicitSurface& surface, const Polygonize& polygonize) {
   std::atomic<std::int64_t> emitters = 0;
   PolygonizeResult result = polygonize([&surface, &emitters](const Vec3& p) {
     std::int64_t taken = 0;
@@ -24,10 +24,10 @@ PolygonizeResult Counted(const ImplicitSurface& surface, const Polygonize& polyg
   return result;
 }
 
-// Appends the cells of a cube of `size` cells where bounds do not prove that there is no surface.
+// Appends the cells of a cube of `size` cells for which bounds do not exclude the surface.
 void AppendUnproven(const ImplicitSurface& surface, const SampleGrid& grid, const GridIndex& low,
                     int size, std::vector<StartCell>& cells) {
-  constexpr int kLeast = 2;  // below, corners cost less than bounds
+  constexpr int kMinCubeSize = 2;  // in smaller cubes, evaluating corners costs less than bounds
   GridIndex end;
   for (int axis = 0; axis < 3; ++axis) {
     end[axis] = std::min(low[axis] + size, grid.counts[axis] - 1);
@@ -39,7 +39,7 @@ void AppendUnproven(const ImplicitSurface& surface, const SampleGrid& grid, cons
   if (bounds.most < 1 || bounds.least > 1) {
     return;
   }
-  if (size > kLeast) {
+  if (size > kMinCubeSize) {
     for (int c = 0; c < 8; ++c) {
       const int half = size / 2;
       AppendUnproven(
@@ -89,7 +89,7 @@ struct Polygonize {
   const RunContext& context;
 
   PolygonizeResult operator()(const NarrowBand& band) const {
-    return Counted(surface, [&](const ScalarField& field) {
+    return CountEmitters(surface, [&](const ScalarField& field) {
       return band.components == FollowedComponents::kAll
                  ? PolygonizeFrom(field, grid, UnprovenCells(surface, grid, context), options,
                                   context)
@@ -97,7 +97,7 @@ struct Polygonize {
     });
   }
   PolygonizeResult operator()(const BruteForce&) const {
-    return Counted(surface, [this](const ScalarField& field) {
+    return CountEmitters(surface, [this](const ScalarField& field) {
       return PolygonizeAll(field, grid, options, context);
     });
   }

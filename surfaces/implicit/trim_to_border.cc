@@ -24,11 +24,11 @@ TriMesh WithDepths(const TriMesh& shell, std::span<const double> depth_mm) {
   return Submesh(shell, keep);
 }
 
-using VertexPair = std::pair<std::int32_t, std::int32_t>;  // the lower vertex first
+using VertexPair = std::pair<std::int32_t, std::int32_t>;  // lower vertex first
 
-VertexPair EdgeOf(const Triangle& t, int e) { return std::minmax(t[e], t[(e + 1) % 3]); }
+VertexPair SortedEdge(const Triangle& t, int e) { return std::minmax(t[e], t[(e + 1) % 3]); }
 
-// What of a mesh with a border is nearest to a point.
+// The part of a mesh with a border that is nearest to a point.
 enum class Nearest { kFront, kBack, kBorder };
 
 class BorderedMesh {
@@ -37,7 +37,7 @@ class BorderedMesh {
       : mesh_(mesh), query_(mesh), on_border_(mesh.points.size(), false) {
     for (const Triangle& t : mesh.triangles) {
       for (int e = 0; e < 3; ++e) {
-        ++triangles_at_[EdgeOf(t, e)];
+        ++triangles_at_[SortedEdge(t, e)];
       }
     }
     for (const auto& [edge, count] : triangles_at_) {
@@ -66,7 +66,7 @@ class BorderedMesh {
         return true;
       }
       const Vec3 along = (b - a).normalized(), from = p - a;
-      const bool is_border = triangles_at_.at(EdgeOf(t, e)) == 1;
+      const bool is_border = triangles_at_.at(SortedEdge(t, e)) == 1;
       if (is_border && (from - from.dot(along) * along).norm() < kClose_mm) {
         return true;
       }
@@ -76,7 +76,7 @@ class BorderedMesh {
 
   const TriMesh& mesh_;
   MeshQuery query_;
-  std::map<VertexPair, int> triangles_at_;  // of each edge, how many
+  std::map<VertexPair, int> triangles_at_;  // number of triangles per edge
   std::vector<bool> on_border_;
 };
 
@@ -92,9 +92,10 @@ bool HasCorner(const Triangle& t, const std::vector<Nearest>& nearest, Nearest k
   return std::any_of(t.begin(), t.end(), [&](std::int32_t v) { return nearest[v] == kind; });
 }
 
-// The triangles of the face over the mesh: those with no corner past the border, and not joined to
-// such through corners behind the mesh. Corners that seem to be behind elsewhere are beside a sharp
-// edge.
+// Selects the triangles over the mesh. A triangle is dropped if a corner is nearest to the border,
+// or if it is connected to such a triangle through triangles with corners behind the mesh.
+// Elsewhere a corner that seems to lie behind the mesh is beside a sharp edge, and its triangle is
+// kept.
 std::vector<bool> TrianglesOver(const TriMesh& face, const std::vector<Nearest>& nearest) {
   std::vector<bool> doubtful;
   for (const Triangle& t : face.triangles) {
@@ -103,7 +104,7 @@ std::vector<bool> TrianglesOver(const TriMesh& face, const std::vector<Nearest>&
   }
   const Components parts = ConnectedComponents(Submesh(face, doubtful));
   std::vector<bool> past(parts.count, false);
-  std::size_t n = 0;  // of the doubtful ones
+  std::size_t n = 0;  // counts doubtful triangles
   for (std::size_t t = 0; t < doubtful.size(); ++t) {
     if (doubtful[t]) {
       const int part = parts.of_triangle[n++];
@@ -133,13 +134,13 @@ TriMesh LargestPart(const TriMesh& mesh) {
   return Submesh(mesh, keep);
 }
 
-// The fans of triangles around each vertex, as sets of corners 3 t + i of triangles: corners at one
-// vertex are of one fan where their triangles share an edge there.
+// The fans of triangles around each vertex, as disjoint sets of the corners 3 t + i. Two corners at
+// a vertex belong to one fan if their triangles share an edge there.
 class CornerFans {
  public:
   explicit CornerFans(const TriMesh& mesh) : parent_(3 * mesh.triangles.size()) {
     std::iota(parent_.begin(), parent_.end(), 0);
-    std::map<VertexPair, std::array<std::int32_t, 2>> first;  // the corners at an edge's ends
+    std::map<VertexPair, std::array<std::int32_t, 2>> first;  // per edge, the corners at its ends
     for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
       for (int e = 0; e < 3; ++e) {
         const Triangle& corners = mesh.triangles[t];
@@ -148,7 +149,7 @@ class CornerFans {
         if (corners[e] > corners[(e + 1) % 3]) {
           std::swap(ends[0], ends[1]);
         }
-        const auto [found, is_new] = first.try_emplace(EdgeOf(corners, e), ends);
+        const auto [found, is_new] = first.try_emplace(SortedEdge(corners, e), ends);
         if (!is_new) {
           parent_[Of(ends[0])] = Of(found->second[0]);
           parent_[Of(ends[1])] = Of(found->second[1]);
@@ -168,12 +169,12 @@ class CornerFans {
   std::vector<std::int32_t> parent_;
 };
 
-// Gives each fan of triangles at a vertex, but for the first, a vertex of its own: fans that touch
-// in one point are no manifold.
+// Gives each fan at a vertex except the first its own vertex, because fans that share only a vertex
+// are not a manifold.
 void SplitFans(TriMesh& mesh) {
   CornerFans fans(mesh);
-  std::vector<std::int32_t> fan_of(mesh.points.size(), -1);  // that keeps the vertex
-  std::map<std::int32_t, std::int32_t> own;                  // vertex of a further fan
+  std::vector<std::int32_t> fan_of(mesh.points.size(), -1);  // the fan that keeps the vertex
+  std::map<std::int32_t, std::int32_t> own;                  // the vertex of another fan
   const auto corner_count = static_cast<std::int32_t>(3 * mesh.triangles.size());
   for (std::int32_t corner = 0; corner < corner_count; ++corner) {
     std::int32_t& v = mesh.triangles[corner / 3][corner % 3];
@@ -202,8 +203,8 @@ TriMesh TrimToSkull(const TriMesh& face, const TriMesh& shell, std::span<const d
   TriMesh over = Submesh(face, TrianglesOver(face, nearest));
   if (over.triangles.empty()) {
     throw InputError(
-        "implicit face: nothing of it lies over a part of the shell that has a depth; with "
-        "'ends: closed' the whole face is kept");
+        "implicit face: no part of it lies over a part of the shell that has a depth; use "
+        "'ends: closed' to keep the whole face");
   }
   SplitFans(over);
   return LargestPart(over);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An implicit face that ends where the skull does, instead of going around its rim.
+// Trims an implicit face so that it ends at the border of the skull, instead of going around its
+// rim.
 #pragma once
 
 #include <span>
@@ -9,11 +10,11 @@
 
 namespace semblance {
 
-// The triangles of a face that lie over the shell's triangles with depths (finite; one per vertex).
-// Dropped is what is nearest to the border of these triangles, and what lies behind them and is
-// joined to that. Of the parts that are left the one with the most area is returned: a manifold if
-// the face is, with the same orientation; the whole face where the shell is closed and has a depth
-// everywhere. Throws InputError if nothing is left.
+// Keeps the triangles of a face that lie over the shell's triangles with finite depths (depth_mm:
+// one per vertex). It drops the triangles that are nearest to the border of these shell triangles,
+// and those behind the shell that are connected to them. Returns the remaining part with the
+// largest area, with the face's orientation; it is a manifold if the face is one. Returns the whole
+// face if the shell is closed and has depths everywhere. Throws InputError if nothing remains.
 TriMesh TrimToSkull(const TriMesh& face, const TriMesh& shell, std::span<const double> depth_mm,
                     const RunContext& context);
 

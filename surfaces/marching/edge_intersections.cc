@@ -9,14 +9,14 @@
 namespace semblance {
 namespace {
 
-// A bracket on [0,1] along an edge: the field is positive at one end and not at the other.
+// An interval of an edge: the field is positive at one end and not at the other.
 struct Bracket {
   double a, fa, b, fb;
 
   double SecantRoot(double weight_a = 1, double weight_b = 1) const {
     return a + (b - a) * (weight_a * fa) / (weight_a * fa - weight_b * fb);
   }
-  // Puts (x, f) in cursor of the end of its sign; true if that was the upper end.
+  // Replaces the end that has the sign of f by (x, f). Returns true if that was the upper end.
   bool Narrow(double x, double f) {
     const bool lower = (f > 0) == (fa > 0);
     (lower ? a : b) = x;
@@ -36,15 +36,15 @@ double Bisect(Bracket e, double tolerance, const LineField& field, std::int64_t&
   return 0.5 * (e.a + e.b);
 }
 
-// What the ends and a point (x, f) between them say of the crossing: a function that bends one way
-// lies between its chords, so the crossing is between where those from both ends to the point have
-// the value 0.
+// An estimate of the crossing from the ends and a point (x, f) between them. A convex or concave
+// function lies between its chords. Hence the crossing lies between the zeros of the chords from
+// both ends to the point.
 struct Estimate {
-  double at;            // where the parabola through the three, position over value, has value 0
-  double uncertain_by;  // NaN where the values neither rise nor fall throughout
+  double at;            // zero of the parabola (position as a function of value) through the three
+  double uncertain_by;  // NaN if the values are not monotonic
 };
 
-Estimate Estimated(const Bracket& e, double x, double f) {
+Estimate EstimateCrossing(const Bracket& e, double x, double f) {
   const double lower = (x - e.a) / (f - e.fa), upper = (e.b - x) / (e.fb - f);
   if (!(lower * upper > 0)) {
     return {x, f == 0 ? 0 : kNaN};
@@ -54,17 +54,18 @@ Estimate Estimated(const Bracket& e, double x, double f) {
   return {std::clamp(e.a - e.fa * (lower - bend * f), least, most), most - least};
 }
 
-// Regula falsi as of Illinois: an end that stays twice counts half. Ends where the last three
-// values tell the crossing within the tolerance, if between them the field bends one way.
+// The Illinois variant of regula falsi: the value of an end that stays twice is halved. Stops once
+// three values determine the crossing within the tolerance, provided that the field is convex or
+// concave between them.
 double FalsePosition(Bracket e, double tolerance, const LineField& field,
                      std::int64_t& evaluations) {
-  constexpr int kMostSteps = 60;
+  constexpr int kMaxSteps = 60;
   double weight_a = 1, weight_b = 1;
   bool last_upper = false;
-  for (int step = 0; step < kMostSteps && e.b - e.a > tolerance; ++step) {
+  for (int step = 0; step < kMaxSteps && e.b - e.a > tolerance; ++step) {
     const double x = e.SecantRoot(weight_a, weight_b), f = field(x);
     ++evaluations;
-    const Estimate crossing = Estimated(e, x, f);
+    const Estimate crossing = EstimateCrossing(e, x, f);
     if (crossing.uncertain_by <= tolerance) {
       return std::clamp(crossing.at, e.a, e.b);
     }
@@ -77,8 +78,8 @@ double FalsePosition(Bracket e, double tolerance, const LineField& field,
   return e.SecantRoot();
 }
 
-// As cells ascend, so do the ids of the same edge of each: one cursor per cell edge, which only
-// goes forward, finds them all.
+// Connects the crossings to triangles. As cells ascend, the ids of their e-th edges ascend too, so
+// that one forward cursor per cell edge finds all ids.
 std::vector<Triangle> Connect(const SampleGrid& grid, const EdgeIntersections& intersections) {
   std::array<std::size_t, 12> cursor{};
   std::vector<Triangle> triangles;
@@ -92,7 +93,7 @@ std::vector<Triangle> Connect(const SampleGrid& grid, const EdgeIntersections& i
     }
     for (const auto& corners : MarchingCubesCases()[cell.mask]) {
       if ((cell.edges >> corners[0] & 1) == 0) {
-        continue;  // of another sheet in the cell
+        continue;  // belongs to another sheet in the cell
       }
       triangles.push_back({static_cast<std::int32_t>(cursor[corners[0]]),
                            static_cast<std::int32_t>(cursor[corners[1]]),
@@ -112,7 +113,7 @@ bool TouchesBorder(const SampleGrid& grid, const std::vector<CrossedCell>& cells
 
 }  // namespace
 
-EdgeLine LineOf(const SampleGrid& grid, const CrossedEdge& edge) {
+EdgeLine MakeEdgeLine(const SampleGrid& grid, const CrossedEdge& edge) {
   const GridIndex low = grid.At(edge.id / 3);
   GridIndex high = low;
   ++high[edge.id % 3];
@@ -132,14 +133,14 @@ double SearchCrossing(double from, double to, const EdgeSearchOptions& options,
       {0, from, 1, to}, options.tolerance, field, evaluations);
 }
 
-PolygonizeResult MeshOf(const SampleGrid& grid, EdgeIntersections intersections) {
+PolygonizeResult BuildMesh(const SampleGrid& grid, EdgeIntersections intersections) {
   std::vector<CrossedEdge>& edges = intersections.edges;
   std::sort(edges.begin(), edges.end(),
             [](const CrossedEdge& a, const CrossedEdge& b) { return a.id < b.id; });
   PolygonizeResult result;
   result.mesh.points.reserve(edges.size());
   for (const CrossedEdge& edge : edges) {
-    result.mesh.points.push_back(LineOf(grid, edge).At(edge.at));
+    result.mesh.points.push_back(MakeEdgeLine(grid, edge).At(edge.at));
   }
   result.mesh.triangles = Connect(grid, intersections);
   result.touches_border = TouchesBorder(grid, intersections.cells);

@@ -23,9 +23,9 @@ int EdgeBetween(int a, int b) {
 
 bool Inside(int mask, int corner) { return mask >> corner & 1; }
 
-// next[e]: the edge that follows crossing edge e on the loop it lies on. On each face a loop enters
-// where, going round the face, an inside run begins, and leaves where that run ends: this keeps
-// diagonal inside corners apart.
+// next[e] is the edge that follows crossed edge e on its loop. Around each face, a loop enters
+// where a run of inside corners begins and leaves where this run ends. This separates diagonal
+// inside corners.
 std::array<int, 12> LinkCrossings(int mask) {
   std::array<int, 12> next;
   next.fill(-1);
@@ -38,8 +38,7 @@ std::array<int, 12> LinkCrossings(int mask) {
       while (Inside(mask, face[(last + 1) % 4])) {
         last = (last + 1) % 4;
       }
-      // Along this face from the run's end to its
-      // beginning.
+      // The loop crosses this face from the run's end to its beginning.
       next[EdgeBetween(face[last], face[(last + 1) % 4])] = EdgeBetween(face[c], face[(c + 1) % 4]);
     }
   }
@@ -60,8 +59,8 @@ bool ShareFace(int edge_a, int edge_b) {
   return false;
 }
 
-// Triangulates loop[first..last] so that the fewest diagonals lie in a face of the cell; returns
-// how many do.
+// Triangulates loop[first..last] with the fewest diagonals in a face of the cell, and returns their
+// number.
 int Triangulate(const Loop& loop, int first, int last, CaseTriangles& triangles) {
   if (last - first < 2) {
     return 0;
@@ -83,7 +82,7 @@ int Triangulate(const Loop& loop, int first, int last, CaseTriangles& triangles)
   return fewest;
 }
 
-std::vector<Loop> LoopsOfCase(int mask) {
+std::vector<Loop> CaseLoops(int mask) {
   std::array<int, 12> next = LinkCrossings(mask);
   std::vector<Loop> loops;
   for (int start = 0; start < 12; ++start) {
@@ -99,17 +98,17 @@ std::vector<Loop> LoopsOfCase(int mask) {
   return loops;
 }
 
-CaseTriangles TrianglesOfCase(int mask) {
+CaseTriangles TriangulateCase(int mask) {
   CaseTriangles triangles;
-  for (const Loop& loop : LoopsOfCase(mask)) {
+  for (const Loop& loop : CaseLoops(mask)) {
     Triangulate(loop, 0, static_cast<int>(loop.size()) - 1, triangles);
   }
   return triangles;
 }
 
-std::array<EdgeBits, 12> JoinedEdgesOfCase(int mask) {
+std::array<EdgeBits, 12> JoinedEdges(int mask) {
   std::array<EdgeBits, 12> joined{};
-  for (const Loop& loop : LoopsOfCase(mask)) {
+  for (const Loop& loop : CaseLoops(mask)) {
     EdgeBits bits = 0;
     for (const std::uint8_t e : loop) {
       bits |= EdgeBits(1 << e);
@@ -134,12 +133,12 @@ auto AllCases(const OfCase& of_case) {
 }  // namespace
 
 const std::array<std::vector<std::array<std::uint8_t, 3>>, 256>& MarchingCubesCases() {
-  static const auto kCases = AllCases(TrianglesOfCase);
+  static const auto kCases = AllCases(TriangulateCase);
   return kCases;
 }
 
 const std::array<std::array<EdgeBits, 12>, 256>& MarchingCubesLoops() {
-  static const auto kLoops = AllCases(JoinedEdgesOfCase);
+  static const auto kLoops = AllCases(JoinedEdges);
   return kLoops;
 }
 

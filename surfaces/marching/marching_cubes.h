@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The 256 cases of marching cubes (Lorensen & Cline 1987), derived by one rule for all faces so
-// that neighbouring cells always agree: on a face with two inside corners across from each other,
-// the inside corners are kept apart. The result has no holes.
+// The 256 cases of marching cubes (Lorensen & Cline 1987). One rule for all faces ensures that
+// neighbouring cells agree, so that the mesh has no holes: two inside corners that lie diagonally
+// on a face are separated.
 #pragma once
 
 #include <array>
@@ -10,10 +10,10 @@
 
 namespace semblance {
 
-// Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2 & 1).
+// An edge of a cell.
 struct CellEdge {
-  int from, to;  // corners, from < to
-  int axis;      // 0, 1 or 2: the direction from `from` to `to`
+  int from, to;  // corners, from < to; corner c lies at (c & 1, c >> 1 & 1, c >> 2 & 1)
+  int axis;      // direction, 0, 1 or 2
 };
 inline constexpr std::array<CellEdge, 12> kCellEdges = {{{0, 1, 0},
                                                          {2, 3, 0},
@@ -28,7 +28,8 @@ inline constexpr std::array<CellEdge, 12> kCellEdges = {{{0, 1, 0},
                                                          {2, 6, 2},
                                                          {3, 7, 2}}};
 
-// The edge that leaves a corner upward along an axis. The corner is on the cell's lower side there.
+// The edge from a corner upward along an axis. The corner must be on the cell's lower side of that
+// axis.
 constexpr int EdgeFrom(int corner, int axis) {
   int e = 0;
   while (kCellEdges[e].from != corner || kCellEdges[e].axis != axis) {
@@ -41,13 +42,13 @@ constexpr int EdgeFrom(int corner, int axis) {
 using EdgeBits = std::uint16_t;
 inline constexpr EdgeBits kAllEdges = (1 << 12) - 1;
 
-// The triangles of a case as triples of edges, counter-clockwise seen from outside. Bit c of the
-// case is set where corner c is inside. No diagonal of a case lies in a face of the cell where one
-// can be avoided, so that cells do not share an edge by accident.
+// The triangles of each case as triples of edges, counter-clockwise seen from outside. Bit c of a
+// case is set if corner c is inside. Diagonals in a face of the cell are avoided if possible, so
+// that two cells do not share such an edge by accident.
 const std::array<std::vector<std::array<std::uint8_t, 3>>, 256>& MarchingCubesCases();
 
-// Of a case, for each edge that is crossed: the edges which its crossing is joined to within the
-// cell, itself too. Two sheets of a surface in one cell do not meet in these.
+// For each case and each crossed edge, the edges on the same sheet of the surface within the cell,
+// including the edge itself. Two sheets in one cell have disjoint sets.
 const std::array<std::array<EdgeBits, 12>, 256>& MarchingCubesLoops();
 
 }  // namespace semblance

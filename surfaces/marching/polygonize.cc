@@ -6,7 +6,10 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <bitset>
+#include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <numeric>
 #include <utility>
 #include <vector>
@@ -14,8 +17,6 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/marching/edge_intersections.h"
-#include "surfaces/marching/slice_marching_cubes.h"
-#include "surfaces/marching/sparse_grid.h"
 
 namespace semblance {
 
@@ -32,7 +33,7 @@ void CheckGrid(const SampleGrid& grid) {
 
 namespace {
 
-GridIndex CornerOf(const GridIndex& cell, int c) {
+GridIndex CellCorner(const GridIndex& cell, int c) {
   return {cell[0] + (c & 1), cell[1] + (c >> 1 & 1), cell[2] + (c >> 2 & 1)};
 }
 
@@ -41,14 +42,13 @@ bool IsCell(const SampleGrid& grid, const GridIndex& cell) {
          cell[1] + 1 < grid.counts[1] && cell[2] + 1 < grid.counts[2];
 }
 
-// The edges of a cell that lie on one of its faces, and what the cell beyond it calls them: each
-// moves there along the axis.
+// The edges of a cell on one of its faces, and their indices in the cell beyond that face.
 struct FaceEdges {
   EdgeBits on = 0;
   std::array<std::uint8_t, 12> beyond{};
 };
 
-FaceEdges EdgesOfFace(int axis, int upper) {
+FaceEdges FindFaceEdges(int axis, int upper) {
   FaceEdges face;
   for (int e = 0; e < 12; ++e) {
     const CellEdge& edge = kCellEdges[e];
@@ -60,18 +60,80 @@ FaceEdges EdgesOfFace(int axis, int upper) {
   return face;
 }
 
-// [2 axis + upper]
+// Indexed by 2 * axis + upper.
 std::array<FaceEdges, 6> AllFaces() {
   std::array<FaceEdges, 6> faces;
   for (int f = 0; f < 6; ++f) {
-    faces[f] = EdgesOfFace(f / 2, f % 2);
+    faces[f] = FindFaceEdges(f / 2, f % 2);
   }
   return faces;
 }
 
-// Goes on from crossed cells to their neighbours, wave by wave, along one component: of two sheets
-// in a cell only the one it came along. A cell's `edges` are those known to belong to the
-// component.
+// Values at some corners of a large grid, in blocks of 8^3 corners that exist only where a corner
+// was requested.
+class SparseGrid {
+ public:
+  explicit SparseGrid(const SampleGrid& grid) {
+    for (int axis = 0; axis < 3; ++axis) {
+      counts_[axis] = (grid.counts[axis] + kEdge - 1) / kEdge;
+    }
+    blocks_.resize(std::size_t(counts_[0]) * counts_[1] * counts_[2]);
+  }
+
+  // The state of a cell, stored at its lowest corner; empty at first.
+  struct CellRecord {
+    EdgeBits edges = 0;
+    std::uint8_t mask = 0;
+  };
+  CellRecord& CellAt(const GridIndex& cell) { return FindOrMakeBlock(cell).cells[Within(cell)]; }
+  // Marks a corner as requested; returns true the first time.
+  bool MarkRequested(const GridIndex& corner) {
+    auto bit = FindOrMakeBlock(corner).requested[Within(corner)];
+    const bool first = !bit;
+    bit = true;
+    return first;
+  }
+
+  // Value of a requested corner. Different corners may be set by several threads at once.
+  void Set(const GridIndex& corner, double value) {
+    blocks_[BlockIndex(corner)]->value[Within(corner)] = value;
+  }
+  double Get(const GridIndex& corner) const {
+    return blocks_[BlockIndex(corner)]->value[Within(corner)];
+  }
+
+ private:
+  static constexpr int kEdge = 8, kCorners = kEdge * kEdge * kEdge;
+  struct Block {
+    std::array<double, kCorners> value;
+    std::array<CellRecord, kCorners> cells{};
+    std::bitset<kCorners> requested;
+  };
+
+  // Indices are not negative; unsigned division is faster.
+  static std::size_t Within(const GridIndex& at) {
+    const auto within = [&at](int axis) { return std::size_t(at[axis]) % kEdge; };
+    return within(0) + kEdge * (within(1) + kEdge * within(2));
+  }
+  std::size_t BlockIndex(const GridIndex& at) const {
+    const auto block = [&at](int axis) { return std::size_t(at[axis]) / kEdge; };
+    return block(0) + std::size_t(counts_[0]) * (block(1) + std::size_t(counts_[1]) * block(2));
+  }
+  Block& FindOrMakeBlock(const GridIndex& at) {
+    std::unique_ptr<Block>& block = blocks_[BlockIndex(at)];
+    if (!block) {
+      block = std::make_unique<Block>();
+    }
+    return *block;
+  }
+
+  GridIndex counts_{};  // number of blocks
+  std::vector<std::unique_ptr<Block>> blocks_;
+};
+
+// Follows components from crossed cells to their neighbours, wave by wave. If a cell contains two
+// sheets, it follows only the one on which it arrived. A cell's `edges` are those known to belong
+// to the followed components.
 class Continuation {
  public:
   Continuation(const ScalarField& field, const SampleGrid& grid, const RunContext& context)
@@ -97,14 +159,14 @@ class Continuation {
   bool Reached(const StartCell& start) {
     return (start.edges & ~corners_.CellAt(grid_.At(start.cell)).edges) == 0;
   }
-  // From now on all sheets in a cell count as one.
-  void TakeWholeCells() {
-    whole_cells_ = true;
+  // From here on all sheets in a cell count as one.
+  void JoinSheetsInCells() {
+    join_sheets_ = true;
     for (const std::int64_t cell : std::vector(cells_)) {
       Visit(grid_.At(cell), kAllEdges);
     }
   }
-  // The cells in ascending order, and their edges.
+  // Returns the cells in ascending order, and their edges.
   EdgeIntersections Take() {
     std::sort(cells_.begin(), cells_.end());
     for (const std::int64_t cell : cells_) {
@@ -129,14 +191,14 @@ class Continuation {
       next_.push_back({index, fresh});
     }
   }
-  // Of the cells that are new.
+  // The corners of new cells that have no value yet.
   std::vector<std::int64_t> UnknownCorners() {
     std::vector<std::int64_t> unknown;
     for (std::size_t n = known_cells_; n < cells_.size(); ++n) {
       const GridIndex at = grid_.At(cells_[n]);
       for (int c = 0; c < 8; ++c) {
-        const GridIndex corner = CornerOf(at, c);
-        if (corners_.FirstAsked(corner)) {
+        const GridIndex corner = CellCorner(at, c);
+        if (corners_.MarkRequested(corner)) {
           unknown.push_back(grid_.Index(corner));
         }
       }
@@ -153,7 +215,7 @@ class Continuation {
   void SetMask(const GridIndex& cell) {
     std::uint8_t mask = 0;
     for (int c = 0; c < 8; ++c) {
-      mask |= static_cast<std::uint8_t>((corners_.Get(CornerOf(cell, c)) > 0) << c);
+      mask |= static_cast<std::uint8_t>((corners_.Get(CellCorner(cell, c)) > 0) << c);
     }
     corners_.CellAt(cell).mask = mask;
   }
@@ -174,7 +236,7 @@ class Continuation {
       if (beyond != 0) {
         GridIndex neighbour = at;
         neighbour[f / 2] += f % 2 != 0 ? 1 : -1;
-        Visit(neighbour, whole_cells_ ? kAllEdges : beyond);
+        Visit(neighbour, join_sheets_ ? kAllEdges : beyond);
       }
     }
   }
@@ -187,8 +249,8 @@ class Continuation {
     intersections_.cells.push_back({cell, kept.mask, kept.edges});
     ForEachOwnEdge(grid_, intersections_.cells.back(), [&](const CellEdge& edge) {
       intersections_.edges.push_back({EdgeId(grid_, at, edge),
-                                      corners_.Get(CornerOf(at, edge.from)),
-                                      corners_.Get(CornerOf(at, edge.to))});
+                                      corners_.Get(CellCorner(at, edge.from)),
+                                      corners_.Get(CellCorner(at, edge.to))});
     });
   }
 
@@ -198,29 +260,29 @@ class Continuation {
   SparseGrid corners_;
   std::array<FaceEdges, 6> faces_;
   const std::array<std::array<EdgeBits, 12>, 256>& loops_ = MarchingCubesLoops();
-  bool whole_cells_ = false;
-  std::vector<std::int64_t> cells_;  // that were visited
-  std::size_t known_cells_ = 0;      // of these, whose corners are known
-  std::vector<StartCell> next_;      // wave
+  bool join_sheets_ = false;
+  std::vector<std::int64_t> cells_;  // visited cells
+  std::size_t known_cells_ = 0;      // number of cells_ with known corners
+  std::vector<StartCell> next_;      // next wave
   EdgeIntersections intersections_;
 };
 
-PolygonizeResult Searched(const ScalarField& field, const SampleGrid& grid,
-                          const EdgeSearchOptions& options, const RunContext& context,
-                          EdgeIntersections intersections) {
+PolygonizeResult SearchEdges(const ScalarField& field, const SampleGrid& grid,
+                             const EdgeSearchOptions& options, const RunContext& context,
+                             EdgeIntersections intersections) {
   std::vector<std::int64_t> counts(intersections.edges.size(), 0);
   ParallelFor(intersections.edges.size(), context.threads, 64, [&](std::size_t n) {
     CrossedEdge& edge = intersections.edges[n];
-    const EdgeLine line = LineOf(grid, edge);
+    const EdgeLine line = MakeEdgeLine(grid, edge);
     edge.at = SearchCrossing(
         edge.from, edge.to, options, [&](double t) { return field(line.At(t)); }, counts[n]);
   });
   intersections.summary.edge_evaluations =
       std::accumulate(counts.begin(), counts.end(), std::int64_t{0});
-  return MeshOf(grid, std::move(intersections));
+  return BuildMesh(grid, std::move(intersections));
 }
 
-// Marches through all cells; layer(k, values) gives the values of the k-th layer of corners.
+// Marches through all cells; layer(k, values) fills in the k-th layer of corners.
 template <class GiveLayer>
 EdgeIntersections MarchAll(const SampleGrid& grid, const RunContext& context,
                            const GiveLayer& layer) {
@@ -229,7 +291,7 @@ EdgeIntersections MarchAll(const SampleGrid& grid, const RunContext& context,
   for (int k = 0; k + 1 < grid.counts[2]; ++k) {
     context.ThrowIfStopped();
     context.Report("polygonize", {}, static_cast<double>(k) / grid.counts[2]);
-    march.GoUp();
+    march.NextLayer();
     layer(k + 1, march.UpperLayer());
     for (int j = 0; j + 1 < grid.counts[1]; ++j) {
       for (int i = 0; i + 1 < grid.counts[0]; ++i) {
@@ -252,7 +314,7 @@ PolygonizeResult PolygonizeAll(const ScalarField& field, const SampleGrid& grid,
     });
   });
   intersections.summary.corner_evaluations = grid.CornerCount();
-  return Searched(field, grid, options, context, std::move(intersections));
+  return SearchEdges(field, grid, options, context, std::move(intersections));
 }
 
 PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid,
@@ -261,7 +323,7 @@ PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid
   CheckGrid(grid);
   Continuation continuation(field, grid, context);
   continuation.Follow(starts);
-  return Searched(field, grid, options, context, continuation.Take());
+  return SearchEdges(field, grid, options, context, continuation.Take());
 }
 
 PolygonizeResult PolygonizeThrough(const ScalarField& field, const SampleGrid& grid,
@@ -272,10 +334,10 @@ PolygonizeResult PolygonizeThrough(const ScalarField& field, const SampleGrid& g
   continuation.Follow(starts.first(std::min<std::size_t>(1, starts.size())));
   const auto reached = [&](const StartCell& start) { return continuation.Reached(start); };
   if (!std::all_of(starts.begin(), starts.end(), reached)) {
-    continuation.TakeWholeCells();
+    continuation.JoinSheetsInCells();
     continuation.Follow(starts);
   }
-  return Searched(field, grid, options, context, continuation.Take());
+  return SearchEdges(field, grid, options, context, continuation.Take());
 }
 
 PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleGrid& grid,
@@ -292,7 +354,7 @@ PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleG
   for (CrossedEdge& edge : intersections.edges) {
     edge.at = edge.from / (edge.from - edge.to);
   }
-  return MeshOf(grid, std::move(intersections));
+  return BuildMesh(grid, std::move(intersections));
 }
 
 }  // namespace semblance

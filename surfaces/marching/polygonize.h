@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a field to triangles: marching cubes on a regular grid (thesis 3.2), each crossing found by
-// a search along its edge.
+// Polygonises a scalar field by marching cubes on a regular grid (thesis 3.2). Each crossing is
+// found by a search along its edge.
 #pragma once
 
 #include <array>
@@ -19,7 +19,7 @@ namespace semblance {
 
 using GridIndex = std::array<int, 3>;
 
-// Corners (i, j, k), 0 <= i < counts[0] etc., at origin + (i, j, k) * cell.
+// A grid of corners (i, j, k), 0 <= i < counts[0] etc., at origin + (i, j, k) * cell_mm.
 struct SampleGrid {
   Vec3 origin = Vec3::Constant(kNaN);
   Vec3 cell_mm = Vec3::Constant(kNaN);  // > 0
@@ -40,10 +40,11 @@ struct SampleGrid {
   std::int64_t CornerCount() const { return std::int64_t{counts[0]} * counts[1] * counts[2]; }
 };
 
-// Throws InputError unless origin and cell are usable and there are 2 corners each way.
+// Throws InputError unless origin and cell are finite, cells are positive, and each axis has 2
+// corners.
 void CheckGrid(const SampleGrid& grid);
 
-// Positive inside, negative outside; called from several threads at once.
+// Positive inside, negative outside. Several threads call it at once.
 using ScalarField = std::function<double(const Vec3&)>;
 
 enum class EdgeSearch { kBisection, kRegulaFalsi };
@@ -52,25 +53,25 @@ constexpr auto EnumNames(EdgeSearch) {
 }
 
 struct EdgeSearchOptions {
-  EdgeSearch method = EdgeSearch::kRegulaFalsi;  // the same point; regula falsi asks less often
-  double tolerance = 1e-3;                       // share of the edge
+  EdgeSearch method = EdgeSearch::kRegulaFalsi;
+  double tolerance = 1e-3;
 };
 template <class Visitor>
 void Fields(Visitor& visit, EdgeSearchOptions& o) {
   visit(FieldInfo{.name = "method",
-                  .doc = "how a crossing is found on a cell's edge: bisection (thesis 3.2.1), or "
+                  .doc = "search for a crossing on a cell's edge: bisection (thesis 3.2.1), or "
                          "regula_falsi (Illinois), the same point in fewer evaluations"},
         o.method);
   visit(FieldInfo{.name = "tolerance",
                   .min = 1e-9,
                   .max = 0.5,
-                  .doc = "of a crossing, as a share of the edge; regula_falsi keeps it where the "
-                         "field bends one way along the edge"},
+                  .doc = "accuracy of a crossing, as a share of the edge; regula_falsi keeps it "
+                         "where the field is convex or concave along the edge"},
         o.tolerance);
 }
 
-// What it took. Evaluations of the field at a corner of the grid and in searches along edges; those
-// of single emitters and of bounds on single emitters, where the field is a sum of emitters.
+// Work counts: evaluations of the field at grid corners and in searches along edges, and, for sums
+// of emitters, evaluations of single emitters and of their bounds.
 struct PolygonizeSummary {
   std::int64_t active_cells = 0;
   std::int64_t corner_evaluations = 0;
@@ -80,39 +81,39 @@ struct PolygonizeSummary {
 };
 
 struct PolygonizeResult {
-  TriMesh mesh;  // outward, each crossing one point, in the order of the grid's edges
-  bool touches_border = false;  // the surface leaves the grid: the mesh is open there
+  TriMesh mesh;                 // outward; one point per crossing, in the order of the grid's edges
+  bool touches_border = false;  // true if the surface leaves the grid, where the mesh is open
   PolygonizeSummary summary;
 };
 
-// All cells of the grid, layer by layer: every corner is evaluated, two layers of them are kept
-// (thesis 3.2.1). The reference for the faster ways.
+// Evaluates every corner of the grid, layer by layer, and keeps two layers (thesis 3.2.1). The
+// reference for the faster methods.
 PolygonizeResult PolygonizeAll(const ScalarField& field, const SampleGrid& grid,
                                const EdgeSearchOptions& options, const RunContext& context);
 
 // A cell from which a component of the surface is followed.
 struct StartCell {
-  std::int64_t cell;           // index of its lowest corner
-  EdgeBits edges = kAllEdges;  // those whose crossings, if there are any, the component has
+  std::int64_t cell;           // index of the lowest corner
+  EdgeBits edges = kAllEdges;  // edges whose crossings, if any, belong to the component
 };
 
-// Only the cells that the surface crosses, found from the start cells by going on across every face
-// that it crosses (Wyvill et al. 1986; Bloomenthal 1988). Finds all of each component that touches
-// a start cell, and no other component: not even one that shares a cell with them. Memory grows
-// with the surface, not with the grid.
+// Visits only cells that the surface crosses: from the start cells it continues across every face
+// that the surface crosses (Wyvill et al. 1986; Bloomenthal 1988). It finds each component that
+// touches a start cell completely, and no other component, not even one that shares a cell with
+// them. Memory grows with the surface, not with the grid.
 PolygonizeResult PolygonizeFrom(const ScalarField& field, const SampleGrid& grid,
                                 std::span<const StartCell> starts, const EdgeSearchOptions& options,
                                 const RunContext& context);
 
-// The component that passes through all the start cells. If the first cell's component does not,
-// because cells are too coarse, then all components that touch a start cell, and whatever shares a
-// cell with these, and so on.
+// Finds the component that passes through all start cells. If the cells are too coarse for one
+// component to do so, it finds all components that touch a start cell, and all components that are
+// connected to these through shared cells.
 PolygonizeResult PolygonizeThrough(const ScalarField& field, const SampleGrid& grid,
                                    std::span<const StartCell> starts,
                                    const EdgeSearchOptions& options, const RunContext& context);
 
-// Marching cubes over given samples, one per corner in the grid's order; crossings by linear
-// interpolation. Throws InputError if their number is not that of the corners.
+// Marching cubes over given samples, one per corner in the grid's order, with crossings by linear
+// interpolation. Throws InputError if there is not one sample per corner.
 PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleGrid& grid,
                                    const RunContext& context);
 

@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "surfaces/base/base64.h"
+#include "surfaces/base/encoding.h"
 
 namespace semblance {
 namespace {

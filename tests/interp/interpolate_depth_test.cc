@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The laws of every scheme of the variant, and what nearest and mean add to them.
+// The laws of every scheme in the variant, and further laws of nearest and mean.
 #include "interp/interpolate_depth.h"
 
 #include <fmt/format.h>
@@ -33,8 +33,8 @@ std::vector<DepthScheme> Defaults(std::index_sequence<Index...>) {
 constexpr std::size_t kAlternatives = std::variant_size_v<DepthScheme> - 1;
 static_assert(std::is_same_v<std::variant_alternative_t<kAlternatives, DepthScheme>, DepthMap>);
 
-// Every scheme with its defaults, but for a map, which comes from a file and not from dowels
-// (depth_map_test); and then the options that change their ways.
+// Every scheme with its defaults, except a map, which comes from a file (depth_map_test), and then
+// with options that change the method.
 std::vector<DepthScheme> Schemes() {
   std::vector<DepthScheme> schemes = Defaults(std::make_index_sequence<kAlternatives>{});
   const DowelDistance along = DowelDistance::kGeodesic;
@@ -134,7 +134,7 @@ TEST_P(EveryScheme, ARigidMotionDoesNotMatter) {
   }
 }
 
-// How far a scheme may miss a dowel that stands on a vertex and has no sd; none where it smooths.
+// The largest error at a dowel that is at a vertex and has no sd; none for schemes that smooth.
 std::optional<double> MissAtDowels_mm(const DepthScheme& scheme) {
   return std::visit(
       [](const auto& o) -> std::optional<double> {
@@ -152,7 +152,7 @@ std::optional<double> MissAtDowels_mm(const DepthScheme& scheme) {
       scheme);
 }
 
-TEST_P(EveryScheme, HonoursTheDowelsUnlessItSmooths) {
+TEST_P(EveryScheme, InterpolatesTheDowelsUnlessItSmooths) {
   DowelScene scene = DomeScene();
   for (Dowel& dowel : scene.dowels) {
     dowel.base = *std::ranges::min_element(scene.skull.points, {},
@@ -254,7 +254,7 @@ TEST_P(EveryScheme, WorksWithThreeDowels) {
   }
 }
 
-TEST_P(EveryScheme, StopsWhenAsked) {
+TEST_P(EveryScheme, StopsOnRequest) {
   const DowelScene scene = FlatScene();
   std::stop_source stop;
   stop.request_stop();
@@ -263,7 +263,7 @@ TEST_P(EveryScheme, StopsWhenAsked) {
   EXPECT_THROW(InterpolateDepth(GetParam(), scene.Input(), run), Cancelled);
 }
 
-TEST_P(EveryScheme, SaysWhatIsWrongWithADowel) {
+TEST_P(EveryScheme, ReportsAFaultyDowel) {
   DowelScene scene = FlatScene();
   scene.dowels[1].base.x() = kNaN;
   EXPECT_EQ(ErrorOf(scene), "dowel 'g': base (nan, 5, 0) is not finite; place it on the skull");
@@ -285,7 +285,7 @@ TEST_P(EveryScheme, SaysWhatIsWrongWithADowel) {
   }
 }
 
-TEST_P(EveryScheme, SaysWhatIsWrongWithTheRest) {
+TEST_P(EveryScheme, ReportsOtherFaults) {
   DowelScene scene = FlatScene();
   scene.dowels.clear();
   EXPECT_EQ(ErrorOf(scene), "dowels: there are none, but a depth needs at least one; place dowels");

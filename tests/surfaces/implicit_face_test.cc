@@ -7,7 +7,6 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/skull_fill.h"
 #include "tests/testing/shapes.h"
-#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {
@@ -50,7 +49,7 @@ TEST(ImplicitFace, ThreadsChangeNoBit) {
   EXPECT_EQ(a.mesh.triangles, b.mesh.triangles);
 }
 
-TEST(ImplicitFace, AFarOutThesisSurfaceStillFitsAndItsDensityIsSaid) {
+TEST(ImplicitFace, AFarOutThesisSurfaceStillFitsAndItsDensityIsReported) {
   const TriMesh sphere = SphereMesh({0, 0, 0}, 60, 40);
   ImplicitFaceOptions options{.resolution = 40};
   options.field.emitter = ThesisEmitter{};

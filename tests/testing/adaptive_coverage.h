@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether the stated uncertainty of an adaptive fit holds.
+// Measures whether the stated uncertainty of an adaptive fit is correct.
 #pragma once
 
 #include <cmath>
@@ -11,9 +11,9 @@
 
 namespace semblance::testing {
 
-// A field with a bump, 1,100 points with noise in z (sixteen for each of the finest patches): the
-// share of a grid on which the fitted surface is no farther from the true one than the interval
-// that should hold 90 %, in the mean of `draws`.
+// Fits a field with a bump to 1,100 points with noise in z (sixteen per finest patch). Returns the
+// share of grid points at which the fitted surface lies within the 90 % interval of the true one,
+// averaged over `draws`.
 inline double AdaptiveCoverage(double tolerance_over_noise, int draws) {
   constexpr double kNoise_mm = 0.01, kNinety = 1.6449;
   constexpr int kCount = 1100, kSide = 24;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Structs of every kind of field, for the tests of the configuration.
+// Structs with every kind of field, for tests of the configuration.
 #pragma once
 
 #include <array>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A skull, dowels on it and their network, together: what depth schemes are tested on.
+// Scenes for tests of depth schemes: a skull with dowels and their network.
 #pragma once
 
 #include <algorithm>
@@ -22,7 +22,7 @@ struct DowelScene {
   DowelNetwork network;
 
   DepthInput Input() const { return {skull, normals, dowels, network}; }
-  // The same dowels asked at these points, whose normals all point along `normal`.
+  // The same dowels with these points as the skull's vertices, all with the normal `normal`.
   DowelScene At(std::vector<Vec3> points, const Vec3& normal = Vec3(0, 0, 1)) const {
     DowelScene scene = *this;
     scene.normals.assign(points.size(), normal);
@@ -46,7 +46,7 @@ inline DowelScene FlatScene() {
   return scene;
 }
 
-// Five dowels on the front (-y) of a sphere of 90 mm, along its radii but for some degrees, in four
+// Five dowels on the front (-y) of a sphere of 90 mm, within some degrees of its radii, in four
 // areas around "n".
 inline DowelScene DomeScene() {
   DowelScene scene;
@@ -86,7 +86,7 @@ inline DowelScene ScatteredScene(int count) {
   return scene;
 }
 
-// All of the scene moved by a rotation and a translation.
+// The whole scene, moved by a rotation and a translation.
 inline DowelScene Moved(DowelScene scene, const Similarity& to_from) {
   scene.skull = Transformed(scene.skull, to_from);
   for (Vec3& normal : scene.normals) {

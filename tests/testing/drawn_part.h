@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A deep-drawn sheet part, as an optical scan sees it: with places that it does not see.
+// A deep-drawn sheet part, scanned optically with gaps.
 #pragma once
 
 #include <algorithm>
@@ -14,8 +14,8 @@ namespace semblance::testing {
 
 inline constexpr double kDrawnDepth = 0.15;
 
-// From a floor at height 0 through a radius into a wall of 75 degrees; x from where the two would
-// meet.
+// The profile from a floor at height 0 through a radius into a wall of 75 degrees. x is measured
+// from the intersection of floor and wall.
 inline double FloorToWall(double x) {
   constexpr double kRadius = 0.02, kWall = 75 * std::numbers::pi / 180;
   const double tangent = kRadius * std::tan(kWall / 2);
@@ -46,7 +46,8 @@ struct DrawnGap {
   Vec2 center;
   double radius;
 };
-// In the floor, across the wall, in a corner of the wall, on the flange, and at the part's corner.
+// Gaps in the floor, across the wall, in a corner of the wall, on the flange, and at the part's
+// corner.
 inline const std::array<DrawnGap, 5> kDrawnGaps = {{{{0.42, 0.5}, 0.08},
                                                     {{0.8, 0.5}, 0.06},
                                                     {{0.25, 0.33}, 0.05},
@@ -58,7 +59,7 @@ inline bool InDrawnGap(const Vec2& uv) {
                      [&](const DrawnGap& g) { return (uv - g.center).norm() < g.radius; });
 }
 
-// What a scan of `count` points at random (u,v) leaves, each coordinate off by noise.
+// A scan of `count` points at random (u,v) without the gaps, with noise in each coordinate.
 inline FitTarget DrawnScan(int count, double noise, std::uint64_t random_seed) {
   FitTarget target = Scattered(DrawnPoint, count, noise, random_seed);
   std::erase_if(target.points, [](const FitPoint& p) { return InDrawnGap(p.uv); });

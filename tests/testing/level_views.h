@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One level's fit on a small open sheet, and one of each term, for law tests.
+// A fit of one level on a small open sheet, and an instance of each term, for law tests.
 #pragma once
 
 #include <cmath>
@@ -8,8 +8,8 @@
 
 #include "fitting/solve/space_solve.h"
 #include "surfaces/base/random.h"
-#include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/splines.h"
 
 namespace semblance::testing {
 
@@ -58,7 +58,7 @@ std::vector<Term> EveryTerm(std::index_sequence<I...>) {
   return {Term(std::in_place_index<I>)...};
 }
 
-// One of each kind with its defaults, and the other choices of their options.
+// One term of each kind with its defaults, and further terms with other options.
 inline std::vector<Term> AllTerms() {
   std::vector<Term> terms = EveryTerm(std::make_index_sequence<std::variant_size_v<Term>>());
   terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kHuber, .loss_width_mm = 1});
@@ -74,14 +74,14 @@ inline std::vector<Term> AllTerms() {
   return terms;
 }
 
-// A bone 4 mm below every observation, whatever way the sheet bends.
+// A bone 4 mm below every observation, however the sheet bends.
 inline void StandOnBone(LevelView& view) {
   for (const Observation& o : view.observations) {
     view.bone.push_back({o, o.position - Vec3(0, 0, 4), Vec3(0, 0, 1)});
   }
 }
 
-// A prior's shape 2 mm above the template, surer at one end than at the other.
+// A prior's shape 2 mm above the template, with a smaller sd at one end than at the other.
 inline void LayShape(LevelView& view) {
   for (const Observation& o : Observe(view.rest, 50, 7)) {
     view.likely.push_back(

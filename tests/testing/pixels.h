@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Single pixels of a picture.
+// Reads single pixels of a picture.
 #pragma once
 
 #include <cstddef>
@@ -9,7 +9,7 @@
 
 namespace semblance::testing {
 
-// At column x, row y, which must be inside.
+// The pixel at column x and row y, which must be inside.
 inline Colour PixelAt(const Image& image, int x, int y) {
   const std::uint8_t* const pixel =
       &image.rgb.at(3 * (static_cast<std::size_t>(y) * static_cast<std::size_t>(image.width) +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sets of scattered points on known surfaces, each of which is hard in another way.
+// Sets of scattered points on known surfaces, each with a different difficulty.
 #pragma once
 
 #include <algorithm>
@@ -18,16 +18,16 @@ namespace semblance::testing {
 
 struct PointSet {
   std::string name;
-  Closure closure = Closure::kOpen;  // open: a height field over (u,v), with errors in z alone
+  Closure closure = Closure::kOpen;  // open: a height field over (u,v), with errors in z only
   double noise = 0;                  // standard deviation
   std::function<Vec3(const Vec2&)> truth;
   std::function<Vec2(Random&)> place;
   double outliers = 0;                      // share
-  std::array<double, 2> gross = {-1, 1};    // by how much outliers are off in z, uniform
-  std::function<bool(const Vec2&)> scored;  // where errors count
+  std::array<double, 2> gross = {-1, 1};    // range of outliers' errors in z, uniform
+  std::function<bool(const Vec2&)> scored;  // region in which errors are measured
 };
 
-// Eleven octaves of gradient noise (Perlin 1985), each lattice turned against the others.
+// Eleven octaves of gradient noise (Perlin 1985) on lattices rotated against each other.
 class Fractal {
  public:
   double operator()(const Vec2& q) const {
@@ -42,7 +42,7 @@ class Fractal {
   }
 
  private:
-  // In [-1, 1), of a lattice point.
+  // A value in [-1, 1) per lattice point.
   static double Hash(int i, int j, int octave, int which) {
     std::uint64_t h =
         (std::uint64_t{static_cast<std::uint32_t>(i)} << 32 | static_cast<std::uint32_t>(j)) *
@@ -73,7 +73,7 @@ inline double Creases(const Vec2& q) {
          std::max(0.0, 0.1 - 2 * std::abs((q - Vec2(0.75, 0.25)).norm() - 0.12));
 }
 
-// A closed tube with nine ridges along it, which sway, and four around it.
+// A closed tube with nine wavy ridges along it and four around it.
 inline Vec3 RidgedTube(const Vec2& q) {
   const double turn = 2 * std::numbers::pi * q.x();
   double r = 1 + 0.08 * std::cos(3 * turn + 4 * q.y());

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Calls of the program, from a folder of the test's own. Define SEMBLANCE_PROGRAM.
+// Calls the program in a folder of the test. Needs the definition SEMBLANCE_PROGRAM.
 #pragma once
 
 #include <fmt/format.h>
@@ -18,7 +18,7 @@ struct Outcome {
   std::string out, err;
 };
 
-// before: what the shell does first, e.g. "ulimit -v 500000;".
+// before: shell commands to run first, e.g. "ulimit -v 500000;".
 inline Outcome CallProgram(const ScratchFolder& folder, const std::string& arguments,
                            const std::string& before = "") {
   const std::string command =

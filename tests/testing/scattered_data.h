@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Scattered data whose surface is known: Franke's function, and a head-like surface, closed in u,
-// with bumps at three scales.
+// Scattered data on known surfaces: Franke's function, and a head-like surface, closed in u, with
+// bumps at three scales.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <string>
 #include <vector>
 
 #include "fitting/problem/fit_target.h"
@@ -29,7 +32,8 @@ struct Bump {
   double u, v, height, width;
 };
 
-// Six large ones, twenty medium, sixty small and crowded where the face would be, two at the seam.
+// Six large bumps, twenty medium ones, sixty small ones crowded in the region of the face, and two
+// at the seam.
 inline constexpr Bump kHeadBumps[] = {
     {0.293443, 0.711028, 0.049173, 0.138333},
     {0.500054, 0.878495, 0.013378, 0.112161},
@@ -121,7 +125,7 @@ inline constexpr Bump kHeadBumps[] = {
     {0.995, 0.55, 0.006, 0.01},
 };
 
-// Of unit size.
+// A head-like surface of unit size.
 inline Vec3 HeadPoint(const Vec2& uv) {
   double r = 1;
   for (const Bump& bump : kHeadBumps) {
@@ -133,7 +137,8 @@ inline Vec3 HeadPoint(const Vec2& uv) {
           1.2 * r * std::cos(t)};
 }
 
-// `count` points of the surface at random (u,v), each coordinate off by noise (standard deviation).
+// `count` points of the surface at random (u,v), with noise (standard deviation) in each
+// coordinate.
 template <class Surface>
 FitTarget Scattered(const Surface& surface, int count, double noise, std::uint64_t random_seed) {
   Random random(random_seed);
@@ -151,7 +156,7 @@ struct CleanError {
   double rms = kNaN, largest = kNaN;
 };
 
-// Distance of the fitted surface from the clean one at the same (u,v), on a dense grid that was not
+// Distance of the fitted surface from the true one at the same (u,v), on a dense grid that was not
 // fitted.
 template <class Surface>
 CleanError ErrorAgainst(const Surface& surface, const HSplineSurface& fitted, int side = 400) {
@@ -179,6 +184,24 @@ inline HSplineSurface PlainStart(const HSplineShape& shape) {
     }
   }
   return HSplineSurface(shape, net);
+}
+
+// Writes points to fit as the text of a table.
+inline std::string PlainCsv(const FitTarget& target) {
+  std::string csv = "x,y,z\n";
+  for (const FitPoint& p : target.points) {
+    csv += fmt::format("{},{},{}\n", p.position.x(), p.position.y(), p.position.z());
+  }
+  return csv;
+}
+
+inline std::string UvCsv(const FitTarget& target) {
+  std::string csv = "x,y,z,u,v\n";
+  for (const FitPoint& p : target.points) {
+    csv += fmt::format("{},{},{},{},{}\n", p.position.x(), p.position.y(), p.position.z(), p.uv.x(),
+                       p.uv.y());
+  }
+  return csv;
 }
 
 }  // namespace semblance::testing

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Small text files for tests of readers, and the words of what was thrown.
+// Small text files for tests of readers, and the messages of exceptions.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -13,7 +13,7 @@
 
 namespace semblance::testing {
 
-// A file named after the running test that holds `text`.
+// Writes `text` to a file named after the running test.
 inline std::filesystem::path ScratchFile(std::string_view text) {
   const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
   const std::filesystem::path path =
@@ -23,7 +23,7 @@ inline std::filesystem::path ScratchFile(std::string_view text) {
   return path;
 }
 
-// The message of the E that `action` throws; a failure of the test if it throws none.
+// The message of the exception E that `action` throws. The test fails if it throws none.
 template <class E, class Action>
 std::string WordsOf(Action&& action) {
   try {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An empty folder for one test, gone afterwards.
+// An empty folder for one test, which is removed afterwards.
 #pragma once
 
 #include <gtest/gtest.h>

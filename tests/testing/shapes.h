@@ -1,11 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Tiny named shapes and seeded random values for tests.
+// Small named meshes for tests.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
+#include <numeric>
+#include <utility>
+#include <vector>
 
+#include "surfaces/base/random.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance::testing {
@@ -74,7 +79,7 @@ inline TriMesh RingMesh(int n) {
   return mesh;
 }
 
-// Two meshes as one, in parts.
+// One mesh with two separate parts.
 inline TriMesh Joined(TriMesh a, const TriMesh& b) {
   const auto offset = static_cast<std::int32_t>(a.points.size());
   a.points.insert(a.points.end(), b.points.begin(), b.points.end());
@@ -84,4 +89,56 @@ inline TriMesh Joined(TriMesh a, const TriMesh& b) {
   return a;
 }
 
+// A surface over the unit square as n x n cells of two triangles, which face along du x dv.
+template <class Surface>
+TriMesh GridMesh(const Surface& surface, int n) {
+  TriMesh mesh;
+  for (int j = 0; j <= n; ++j) {
+    for (int i = 0; i <= n; ++i) {
+      mesh.points.push_back(surface(Vec2(static_cast<double>(i) / n, static_cast<double>(j) / n)));
+    }
+  }
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      const int a = i + (n + 1) * j, b = a + 1, c = a + n + 1, d = c + 1;
+      mesh.triangles.push_back({a, b, d});
+      mesh.triangles.push_back({a, d, c});
+    }
+  }
+  return mesh;
+}
+
+// The mesh with its vertices and triangles in an order that is unrelated to their places.
+inline TriMesh Shuffled(const TriMesh& mesh) {
+  Random random(3);
+  std::vector<std::int32_t> number(mesh.points.size());
+  std::iota(number.begin(), number.end(), 0);
+  for (std::size_t k = number.size(); k-- > 1;) {
+    std::swap(number[k], number[random.Index(k + 1)]);
+  }
+  TriMesh shuffled = mesh;
+  for (std::size_t v = 0; v < number.size(); ++v) {
+    shuffled.points[number[v]] = mesh.points[v];
+  }
+  for (Triangle& t : shuffled.triangles) {
+    t = {number[t[0]], number[t[1]], number[t[2]]};
+  }
+  std::ranges::sort(shuffled.triangles);
+  return shuffled;
+}
+
 }  // namespace semblance::testing
+
+namespace semblance {
+
+// The enclosed volume, mm^3; > 0 if the mesh is closed and outward. For an open mesh it depends on
+// the origin.
+inline double SignedVolume(const TriMesh& mesh) {
+  double six_volumes = 0;
+  for (const Triangle& t : mesh.triangles) {
+    six_volumes += mesh.points[t[0]].dot(mesh.points[t[1]].cross(mesh.points[t[2]]));
+  }
+  return six_volumes / 6;
+}
+
+}  // namespace semblance

@@ -11,13 +11,13 @@
 
 namespace semblance::testing {
 
-// A bent sheet (open) or a tube (closed in u).
+// A bent sheet (open), or a tube (closed in u).
 inline Vec3 SmoothPlace(const HSplineShape& shape, double u, double v) {
   const double angle = (shape.ClosedU() ? 2 * std::numbers::pi : 2.0) * u;
   return {50 * std::cos(angle), 50 * std::sin(angle), 80 * v};
 }
 
-// Level 0 over that, shaken a little; no edits yet.
+// Level 0 over such a shape, with small random changes and without edits.
 inline HSplineSurface SmoothSurface(const HSplineShape& shape, std::uint64_t random_seed) {
   Random random(random_seed);
   ControlNet net{shape.Columns(0), shape.Rows(0), {}};
@@ -30,7 +30,7 @@ inline HSplineSurface SmoothSurface(const HSplineShape& shape, std::uint64_t ran
   return HSplineSurface(shape, net);
 }
 
-// The same with `edits` random offsets on each level above 0.
+// The same with `edits` random offsets per level above 0.
 inline HSplineSurface RandomSurface(const HSplineShape& shape, std::uint64_t random_seed,
                                     int edits = 12) {
   HSplineSurface surface = SmoothSurface(shape, random_seed);
@@ -45,6 +45,38 @@ inline HSplineSurface RandomSurface(const HSplineShape& shape, std::uint64_t ran
     surface.SetOffsets(offsets);
   }
   return surface;
+}
+
+// The `order`-th derivative (0..3) at x of the cubic B-spline with knots 0, 1, 2, 3, 4, from
+// truncated powers: B(x) = sum_k (-1)^k C(4,k) (x - k)_+^3 / 6.
+inline double CubicBSpline(double x, int order = 0) {
+  if (x <= 0 || x >= 4) {
+    return 0;
+  }
+  const double binomial[] = {1, -4, 6, -4, 1};
+  const double factor[] = {1.0 / 6, 1.0 / 2, 1, 1};
+  double sum = 0;
+  for (int k = 0; k <= 4; ++k) {
+    if (x > k) {
+      sum += binomial[k] * factor[order] * std::pow(x - k, 3 - order);
+    }
+  }
+  return sum;
+}
+
+// Weights of the sixteen vertices of an open net of m x n patches at (u,v) in [0,1]^2, for the
+// derivative of orders (du, dv).
+inline Stencil PlainStencil(int m, int n, const Vec2& uv, int du = 0, int dv = 0) {
+  const double x = uv.x() * m, y = uv.y() * n;
+  const int i = std::min(static_cast<int>(x), m - 1), j = std::min(static_cast<int>(y), n - 1);
+  Stencil s;
+  for (int k = 0; k < 16; ++k) {
+    const int a = i + k % 4, b = j + k / 4;
+    s.index[k] = a + (m + 3) * b;
+    s.weight[k] = std::pow(m, du) * CubicBSpline(x - a + 3, du) * std::pow(n, dv) *
+                  CubicBSpline(y - b + 3, dv);
+  }
+  return s;
 }
 
 }  // namespace semblance::testing

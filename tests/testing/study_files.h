@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a study leaves, for tests that compare studies byte by byte.
+// The output of a study, for tests that compare studies byte by byte.
 #pragma once
 
 #include <filesystem>
@@ -12,8 +12,8 @@
 
 namespace semblance::testing {
 
-// The files of a study's folder by name, its tables made anew; without what differs from run to
-// run: the trials' timing.json, and the seconds in the report.
+// The files of a study's folder by name, after its tables were rewritten, without the parts that
+// differ from run to run: the trials' timing.json and the seconds in the report.
 inline std::map<std::string, std::string> StudyFiles(const std::filesystem::path& root) {
   OutputFolder output(root, WhenNotEmpty::kReplaceFiles);
   WriteStudyTables(output);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A terrain of any roughness, known exactly everywhere.
+// A terrain of any roughness with exact heights everywhere.
 #pragma once
 
 #include <cmath>

@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A phantom's head in every kind of file, written by ITK or by hand and read back.
+// A phantom's head in every kind of volume file, written by ITK or by hand, and read back. For
+// tests that link ITK.
 #pragma once
 
-#include <Eigen/Dense>  // before ITK, which else brings a part of an older one
+#include <Eigen/Dense>  // before ITK, which includes a part of an older Eigen
 
 #include <archive.h>
 #include <archive_entry.h>
 #include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <itkGDCMImageIO.h>
+#include <itkImageIOBase.h>
+#include <itkMetaDataObject.h>
 #include <itkNiftiImageIO.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <filesystem>
 #include <string>
@@ -20,13 +25,86 @@
 #include "problems/phantom/phantom_ct.h"
 #include "problems/volumes/itk_files.h"
 #include "problems/volumes/read_volume.h"
+#include "problems/volumes/voxel_array.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_query.h"
-#include "tests/testing/itk_writers.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance::testing {
+
+inline void SetGeometry(const std::array<int, 3>& counts, const Vec3& origin, const Mat3& steps,
+                        itk::ImageIOBase& io) {
+  io.SetNumberOfDimensions(3);
+  itk::ImageIORegion region(3);
+  for (unsigned axis = 0; axis < 3; ++axis) {
+    const Vec3 step = steps.col(axis);
+    const Vec3 unit = step.normalized();
+    io.SetDimensions(axis, counts[axis]);
+    io.SetOrigin(axis, origin[axis]);
+    io.SetSpacing(axis, step.norm());
+    io.SetDirection(axis, std::vector<double>{unit.x(), unit.y(), unit.z()});
+    region.SetIndex(axis, 0);
+    region.SetSize(axis, counts[axis]);
+  }
+  io.SetIORegion(region);
+  io.SetPixelType(itk::IOPixelEnum::SCALAR);
+  io.SetNumberOfComponents(1);
+}
+
+template <class Value = std::int16_t>
+void WriteItk(const std::filesystem::path& path, const VoxelArray& array, itk::ImageIOBase& io) {
+  SetGeometry(array.counts, array.origin, array.steps, io);
+  io.SetComponentType(itk::ImageIOBase::MapPixelType<Value>::CType);
+  io.SetFileName(path.string());
+  const std::vector<Value> values(array.values.begin(), array.values.end());
+  io.Write(values.data());
+}
+
+// The attributes of a DICOM slice besides its voxels.
+struct SliceWords {
+  std::string series = "1.2.3.1", number = "1", modality = "CT", description = "test";
+  std::string compression = "";  // "JPEG" (lossless), "JPEG2000", "RLE"; empty: none
+  double slope = 1, intercept = 0;
+};
+
+// Slice k of the array as a file of its own.
+inline void WriteDicomSlice(const std::filesystem::path& path, const VoxelArray& array, int k,
+                            const SliceWords& words) {
+  const auto io = itk::GDCMImageIO::New();
+  SetGeometry({array.counts[0], array.counts[1], 1}, array.origin + k * array.steps.col(2),
+              array.steps, *io);
+  itk::MetaDataDictionary& tags = io->GetMetaDataDictionary();
+  const auto put = [&](const char* tag, const std::string& text) {
+    itk::EncapsulateMetaData<std::string>(tags, tag, text);
+  };
+  put("0008|0060", words.modality);
+  put("0008|103e", words.description);
+  put("0020|000d", "1.2.3");
+  put("0020|000e", words.series);
+  put("0020|0011", words.number);
+  put("0020|0013", fmt::format("{}", k + 1));
+  put("0028|1052", fmt::format("{}", words.intercept));
+  put("0028|1053", fmt::format("{}", words.slope));
+  io->KeepOriginalUIDOn();
+  if (!words.compression.empty()) {
+    io->UseCompressionOn();
+    io->SetCompressor(words.compression);
+  }
+  io->SetComponentType(itk::IOComponentEnum::SHORT);
+  io->SetFileName(path.string());
+  const std::size_t size = static_cast<std::size_t>(array.counts[0]) * array.counts[1];
+  io->Write(array.values.data() + k * size);
+}
+
+// All slices, with names whose order differs from the order in space.
+inline void WriteDicom(const std::filesystem::path& folder, const VoxelArray& array,
+                       const SliceWords& words = {}) {
+  std::filesystem::create_directories(folder);
+  for (int k = 0; k < array.counts[2]; ++k) {
+    WriteDicomSlice(folder / fmt::format("IM{:03}", (k * 37 + 11) % 101), array, k, words);
+  }
+}
 
 namespace fs = std::filesystem;
 
@@ -49,7 +127,7 @@ inline VoxelArray ArrayOf(const CtVolume& volume) {
   return array;
 }
 
-// The same voxels as a file may have them: sagittal slices, rows from above, from left to right.
+// The same voxels in another order of a file: sagittal slices, rows from above, from left to right.
 inline VoxelArray SagittalArrayOf(const CtVolume& v) {
   VoxelArray array;
   array.counts = {v.rows, v.slices, v.columns};
@@ -66,7 +144,7 @@ inline VoxelArray SagittalArrayOf(const CtVolume& v) {
   return array;
 }
 
-// The values as a grid elsewhere in space has them.
+// The values sampled on another grid in space.
 inline CtVolume Resampled(const CtVolume& from, CtVolume to) {
   to.values.resize(to.Index(0, 0, to.slices));
   for (int k = 0; k < to.slices; ++k) {
@@ -79,7 +157,7 @@ inline CtVolume Resampled(const CtVolume& from, CtVolume to) {
   return to;
 }
 
-// Bytes of the machine, which are little-endian.
+// The bytes of values in memory, which are little-endian.
 template <class Value>
 std::string BytesOf(const std::vector<Value>& values) {
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Value)};
@@ -90,7 +168,7 @@ void PutAt(std::size_t at, Value value, std::string& bytes) {
   std::memcpy(bytes.data() + at, &value, sizeof value);
 }
 
-// One member.
+// Compresses bytes to a gzip stream of one member.
 inline std::string Gzipped(const std::string& bytes) {
   std::string packed(bytes.size() + 1000, ' ');
   std::size_t used = 0;
@@ -109,7 +187,7 @@ inline std::string Gzipped(const std::string& bytes) {
   return packed;
 }
 
-// Of an NRRD that lies in LPS, as its header says it.
+// The header of an NRRD file in the space LPS.
 inline std::string LpsDirections(const VoxelArray& a, const Vec3& to_space, const char* more = "") {
   std::string directions;
   for (int axis = 0; axis < 3; ++axis) {
@@ -130,7 +208,7 @@ class VolumeFilesTest : public ::testing::Test {
     return WordsOf<Error>([&] { Read(name, options); });
   }
 
-  // What was read is what was written, at the same places.
+  // Checks that the read volume equals the written one, at the same places.
   void ExpectTheHead(const VolumeReading& reading) const {
     const CtVolume& read = reading.volume;
     ASSERT_EQ(read.columns, head_.volume.columns);
@@ -163,7 +241,7 @@ class VolumeFilesTest : public ::testing::Test {
     return ReadFileBytes(folder_ / "plain.nii");
   }
 
-  // The skull of what was read lies within half a voxel of the phantom's, at its outer side.
+  // Checks that the skull of the read volume lies within half a voxel of the phantom's outer side.
   void ExpectTheSkull(const CtVolume& volume) const {
     const TriMesh skull = ImportCt(volume, {.bone_hu = 520}, {}).skull;
     const MeshQuery query(skull);

@@ -9,9 +9,9 @@
 #include <vector>
 
 #include "surfaces/base/random.h"
-#include "tests/testing/grid_mesh.h"
 #include "tests/testing/point_sets.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "fitting/least_squares/patch_energy.h"
 #include "surfaces/base/random.h"
-#include "tests/testing/plain_bspline.h"
 #include "tests/testing/shapes.h"
+#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {

@@ -12,8 +12,8 @@
 #include "fitting/nested/nested_solve.h"
 #include "fitting/solve/space_solve.h"
 #include "surfaces/base/random.h"
-#include "tests/testing/plain_bspline.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {

@@ -7,8 +7,8 @@
 #include <cmath>
 
 #include "fitting/nested/nested_points.h"
-#include "tests/testing/plain_bspline.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/splines.h"
 
 namespace semblance {
 namespace {

@@ -9,7 +9,6 @@
 
 #include "fitting/folds/fold_check.h"
 #include "surfaces/base/error.h"
-#include "tests/testing/grid_mesh.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {

@@ -11,7 +11,6 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
-#include "tests/testing/grid_mesh.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/shapes.h"
 

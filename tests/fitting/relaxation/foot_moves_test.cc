@@ -13,8 +13,8 @@
 #include "fitting/fit.h"
 #include "fitting/problem/start_surface.h"
 #include "surfaces/base/error.h"
-#include "tests/testing/grid_mesh.h"
 #include "tests/testing/scattered_data.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {

@@ -107,7 +107,7 @@ TEST(CrossValidation, OfTheMeanIsTheMeanOfTheOthers) {  // depths 4, 7, 9, 5
   EXPECT_NEAR(result.most_mm, 11 / 3., 1e-12);
 }
 
-// The mean states no sd: that of each dowel is learned from the others.
+// The mean states no sd, so that the sd of each dowel is learned from the others.
 TEST(CrossValidation, LearnsAnSdFromTheOtherFolds) {
   const CrossValidation result = Validate(Mean{}, FlatScene());
   EXPECT_FALSE(result.own_sd);
@@ -127,8 +127,9 @@ TEST(CrossValidation, LearnsAnSdFromTheOtherFolds) {
   EXPECT_TRUE(Validate(Kriging{}, ScatteredScene(20)).own_sd);
 }
 
-// Where the network ends without a left-out dowel, the rule answers, and the scheme is not scored.
-TEST(CrossValidation, ScoresTheSchemeWhereItAnswersItself) {
+// If the network ends without a left-out dowel, the outside rule predicts, and the scheme gets no
+// score.
+TEST(CrossValidation, ScoresTheSchemesOwnPredictions) {
   DowelScene scene = FlatScene();
   scene.dowels.push_back({"zz", {20, 20, 0}, Vec3(0, 0, 1), 12, 1});
   scene.network.areas = {{0, 1, 4}, {1, 2, 4}, {2, 3, 4}, {3, 0, 4}};
@@ -159,8 +160,8 @@ TEST(CrossValidation, GivesAFieldTheSdThatItsErrorsShow) {
       testing::SameBytes(WithStatedSd(own, Validate(Kriging{}, scene), scene.Input(), {}), own));
 }
 
-// Schemes that hand on the dowels' sd have 0 everywhere where all dowels are exact.
-TEST(CrossValidation, ExactDowelsSayNothingOfTheBoneBetweenThem) {
+// Schemes that pass on the dowels' sd state 0 everywhere if all dowels are exact.
+TEST(CrossValidation, TheSdOfExactDowelsIsNotUsedBetweenThem) {
   DowelScene scene = ScatteredScene(20);
   for (Dowel& dowel : scene.dowels) {
     dowel.sd_mm = 0;
@@ -174,13 +175,13 @@ TEST(CrossValidation, ExactDowelsSayNothingOfTheBoneBetweenThem) {
   for (std::size_t v = 0; v < field.status.size(); ++v) {
     EXPECT_TRUE(!std::isfinite(field.depth_mm[v]) || field.sd_mm[v] > 0);
   }
-  scene.dowels[3].sd_mm = 1;  // one that is not: what the scheme states stands, also 0
+  scene.dowels[3].sd_mm = 1;  // one dowel is not exact: the scheme's sd is used, also where it is 0
   EXPECT_TRUE(Validate(Nearest{}, scene).own_sd);
 }
 
-TEST(CrossValidation, AsksWhetherTheErrorIsWithinTheStatedSd) {
-  // Nearest to sg are g and rhi alike, g first: 7 +- 2 for 4. For n: 7 +- 2 for 9. For g: n would
-  // be 9 +- 3 as near as sg, n first. For rhi: n 9 +- 3 for 5.
+TEST(CrossValidation, MarksErrorsWithinTheStatedSd) {
+  // sg is equally near to g and rhi, and g comes first: 7 +- 2 for 4. n gets 7 +- 2 for 9. g is
+  // equally near to n and sg, and n comes first: 9 +- 3. rhi gets n's 9 +- 3 for 5.
   CrossValidation result = Validate(Nearest{}, FlatScene());
   EXPECT_THAT(result.left_out[0].within_90, ::testing::Optional(true));  // 3 < 3.29
   EXPECT_EQ(result.left_out[0].sd_mm, 2);
@@ -192,8 +193,8 @@ TEST(CrossValidation, AsksWhetherTheErrorIsWithinTheStatedSd) {
   EXPECT_EQ(result.coverage_90, 0.5);
 }
 
-TEST(CrossValidation, TakesTheAreasOfALeftOutDowelAway) {
-  // Without sg the area of the other three is left, in which sg is not; the rule then fills.
+TEST(CrossValidation, RemovesTheAreasOfALeftOutDowel) {
+  // Without sg the area of the other three remains. sg is outside it, so that the rule predicts.
   const CrossValidation none = CrossValidate(Barycentric{}, LeaveUnassigned{}, FlatScene().Input(),
                                              {{1}, {3}}, OnThreads(1));
   EXPECT_EQ(none.predicted, 0);
@@ -216,7 +217,7 @@ TEST(CrossValidation, LeavesAFoldOutTogether) {
   EXPECT_EQ(result.left_out[2].predicted_mm, 5.5);
 }
 
-TEST(CrossValidation, AsksSchemesOnTheSurfaceThere) {
+TEST(CrossValidation, EvaluatesSchemesOnTheSurfaceAtTheDowel) {
   const DowelScene scene = ScatteredScene(8);
   DowelScene without = scene;
   without.dowels.erase(without.dowels.begin() + 6);
@@ -254,8 +255,8 @@ TEST(CrossValidation, DoesNotDependOnThreads) {
   }
 }
 
-// Of four or five dowels a left-out pair leaves too few for the three factors of a mean.
-TEST(CrossValidation, LeavesTheRuleToAnswerWhereAFoldLeavesTooFewDowels) {
+// If a pair is left out of four or five dowels, too few remain for the three factors of a mean.
+TEST(CrossValidation, UsesTheRuleIfAFoldLeavesTooFewDowels) {
   DowelScene scene = ScatteredScene(5);
   const Kriging relief{.mean = DepthMean::kCovariates};
   for (const DepthScheme& scheme :
@@ -269,7 +270,7 @@ TEST(CrossValidation, LeavesTheRuleToAnswerWhereAFoldLeavesTooFewDowels) {
   }
 }
 
-TEST(CrossValidation, SaysWhatIsWrongWithAFold) {
+TEST(CrossValidation, ReportsAFaultyFold) {
   const DowelScene scene = FlatScene();
   EXPECT_EQ(ErrorOf(scene, {{0}, {4}}),
             "cross-validation: fold 1 names dowel 4, but there are 4 (0..3); make the folds from "

@@ -44,7 +44,7 @@ TEST(DepthDirections, OfTheMeshAreItsNormals) {
   EXPECT_TRUE(testing::SameBytes(Directions(MeshNormal{}, scene), scene.normals));
 }
 
-// Against all pairs; the wall's inner side is 1 mm under the outer one.
+// Compared with all pairs; the wall's inner side is 1 mm under the outer one.
 TEST(DepthDirections, SmoothedOnesAreTheMeanWithinTheRadiusOfOneSide) {
   DowelScene scene = FlatScene();
   Random random(4);

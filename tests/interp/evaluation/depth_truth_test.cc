@@ -35,7 +35,7 @@ DepthTruth Measure(const std::vector<Vec3>& points, const Vec3& direction, const
 
 TEST(DepthTruth, OfConcentricSpheresIsTheirGapByBothConventions) {
   const TriMesh skull = SphereMesh({1, 2, 3}, 80, 30);
-  // Turned, so that no ray meets a corner.
+  // Rotated, so that no ray meets a corner.
   const Mat3 rotation = Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   const TriMesh skin = Transformed(SphereMesh({0, 0, 0}, 90, 30),
                                    {.rotation = rotation, .translation = Vec3(1, 2, 3)});
@@ -62,7 +62,7 @@ TEST(DepthTruth, UnderTiltedSkinTheTwoDifferByTheCosine) {
   }
 }
 
-TEST(DepthTruth, SaysWhyThereIsNone) {
+TEST(DepthTruth, ReportsWhyADepthIsMissing) {
   const auto statuses = [](const DepthTruth& truth) {
     return std::pair(truth.along_direction.status[0], truth.closest.status[0]);
   };
@@ -74,7 +74,7 @@ TEST(DepthTruth, SaysWhyThereIsNone) {
   EXPECT_EQ(statuses(Measure({{0, 0, 10}}, {0, 0, 1}, plate)), std::pair(kNoHit, kBehind));
   EXPECT_EQ(statuses(Measure({{0, 0, 0}}, {0, 0, 1}, TiltedPlate(200, 8, 1.4))),
             std::pair(kGrazing, kGrazing));
-  // What the ray enters by is an inner wall or another part's skin: the vertex is in the air.
+  // A ray that enters skin starts in the air: the skin is an inner wall or belongs to another part.
   EXPECT_EQ(statuses(Measure({{0, 0, 0}}, {0, 0, 1}, TiltedPlate(200, 8, std::numbers::pi))),
             std::pair(kNoHit, kGrazing));
   const DepthTruth none = Measure({{0, 0, -60}}, {0, 0, 1}, plate);
@@ -82,7 +82,7 @@ TEST(DepthTruth, SaysWhyThereIsNone) {
   EXPECT_TRUE(std::isnan(none.closest.depth_mm[0]));
 }
 
-TEST(DepthTruth, NeedsADirectionAVertex) {
+TEST(DepthTruth, NeedsOneDirectionPerVertex) {
   EXPECT_THROW(MeasureDepthTruth({{{0, 0, 0}}, {}}, {}, Plate(10, 1), {}, OnThreads(1)),
                InputError);
 }

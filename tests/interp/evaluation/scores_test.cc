@@ -9,16 +9,19 @@
 #include <numbers>
 #include <numeric>
 
-#include "interp/evaluation/calibration.h"
+#include "surfaces/base/geometry.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
 
+using ::testing::Each;
+using ::testing::IsEmpty;
+
 double NormalCumulative(double z) { return std::erfc(-z / std::numbers::sqrt2) / 2; }
 
-// Half the width of the interval that holds a share, by bisection of the distribution.
+// Half the width of the interval with a probability, by bisection of the distribution.
 double HalfWidth(double sd_mm, double share) {
   double low = 0, high = 10 * sd_mm;
   for (int k = 0; k < 80; ++k) {
@@ -28,8 +31,8 @@ double HalfWidth(double sd_mm, double share) {
   return low;
 }
 
-// The definition, summed over small steps: the squared distance of the forecast's distribution from
-// that of the truth, which jumps from 0 to 1.
+// The definition summed over small steps: the squared distance of the forecast's distribution from
+// the truth's, which jumps from 0 to 1.
 double CrpsBySum(double error_mm, double sd_mm) {
   constexpr int kSteps = 400000;
   const double reach = 12 * sd_mm + std::abs(error_mm), step = 2 * reach / kSteps;
@@ -73,7 +76,7 @@ TEST(LogScore, IsLessTheLogarithmOfTheDensity) {
   EXPECT_NEAR(GaussianLogScore(error, sd), -std::log(density), 1e-8);
 }
 
-// No statement is better in the mean than the true one.
+// No forecast has a better mean score than the correct one.
 TEST(Scores, AreProper) {
   Random random(3);
   std::vector<double> errors, shifted;
@@ -92,7 +95,7 @@ TEST(Scores, AreProper) {
   }
 }
 
-TEST(Scores, OfATrueStatementHoldWhatTheyStateAndArePlain) {
+TEST(Scores, OfACorrectForecastAgreeWithItsSd) {
   Random random(5);
   std::vector<double> errors, sds;
   for (int n = 0; n < 40000; ++n) {
@@ -110,7 +113,7 @@ TEST(Scores, OfATrueStatementHoldWhatTheyStateAndArePlain) {
   }
 }
 
-TEST(Pit, TellsTooThickFromTooThin) {
+TEST(Pit, DistinguishesTooThickFromTooThin) {
   EXPECT_NEAR(GaussianPit(1.6448536269514722, 1), 0.05, 1e-12);  // predicted too thick
   EXPECT_NEAR(GaussianPit(-1.6448536269514722, 1), 0.95, 1e-12);
 }
@@ -130,7 +133,7 @@ TEST(Scores, AreMeansByWeightOverWhatIsKnown) {
   EXPECT_EQ(scores.coverage_50, 0);
 }
 
-// What the scores of ever smaller deviations tend to, without a jump at 0.
+// The scores tend to these values as the sd decreases, without a jump at 0.
 TEST(Scores, OfACertainForecastAreTheLimitsOfSmallDeviations) {
   for (const double error : {-0.3, 0.7}) {
     EXPECT_NEAR(GaussianCrps_mm(error, 0), GaussianCrps_mm(error, 1e-9), 1e-8);
@@ -183,6 +186,43 @@ TEST(Scores, OfNothingAreNothing) {
   EXPECT_TRUE(std::isnan(scores.mae_mm));
   EXPECT_TRUE(std::isnan(scores.crps_mm));
   EXPECT_TRUE(scores.pit.empty());
+}
+
+// Sums of twelve uniform numbers: normal to a tenth of a per cent within two deviations.
+TEST(Coverage, OfTrueDeviationsIsWhatTheyState) {
+  Random random(1);
+  std::vector<double> errors, sds;
+  for (int n = 0; n < 20000; ++n) {
+    sds.push_back(random.Uniform(0.5, 3));
+    errors.push_back(sds.back() * random.BoundedNormal());
+  }
+  const std::vector<double> coverage = Coverage(errors, sds);
+  ASSERT_EQ(coverage.size(), 19u);
+  for (int k = 0; k < 19; ++k) {
+    EXPECT_NEAR(coverage[k], (k + 1) / 20.0, 0.015) << k;
+  }
+  EXPECT_EQ(CoverageAt90(coverage), coverage[17]);
+  for (double& sd : sds) {
+    sd /= 2;  // too small: 58.9 % lie within 1.645 / 2 deviations
+  }
+  EXPECT_NEAR(CoverageAt90(Coverage(errors, sds)), 0.589, 0.015);
+}
+
+TEST(Coverage, WeightsErrorsAndIgnoresThoseWithoutAnSd) {
+  const std::vector<double> errors = {0, 10, kNaN, 5}, sds = {1, 1, 1, kNaN},
+                            weights = {3, 1, 100, 100};
+  EXPECT_THAT(Coverage(errors, sds, weights), Each(0.75));
+  EXPECT_THAT(Coverage(errors, sds), Each(0.5));
+}
+
+TEST(Coverage, ADeviationOfZeroHoldsNoError) {
+  EXPECT_THAT(Coverage(std::vector<double>{0, 1}, std::vector<double>{0, 0}), Each(0.5));
+  EXPECT_THAT(Coverage(std::vector<double>{1e-15}, std::vector<double>{0}), Each(1));  // round-off
+}
+
+TEST(Coverage, OfNothingIsNothing) {
+  EXPECT_THAT(Coverage({}, {}), IsEmpty());
+  EXPECT_TRUE(std::isnan(CoverageAt90({})));
 }
 
 }  // namespace

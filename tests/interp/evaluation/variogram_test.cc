@@ -24,7 +24,7 @@ TEST(Variogram, IsHalfTheMeanSquaredDifference) {
   EXPECT_DOUBLE_EQ(bins[1].semivariance_mm2, 51);
 }
 
-TEST(Variogram, LeavesOutWhatIsUnknownAndWhatWeighsNothing) {
+TEST(Variogram, IgnoresUnknownValuesAndZeroWeights) {
   const std::vector<Vec3> points = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
   const std::vector<VariogramBin> bins = EmpiricalVariogram(
       points, std::vector<double>{1, kNaN, 3, 100}, std::vector<double>{1, 1, 1, 0}, 10, 100);
@@ -33,8 +33,8 @@ TEST(Variogram, LeavesOutWhatIsUnknownAndWhatWeighsNothing) {
   EXPECT_DOUBLE_EQ(bins[0].semivariance_mm2, 2);
 }
 
-// Points that stand for three times as much count as three points there do; so for few points,
-// which are all taken, and for many.
+// A point of weight three counts as three points, both for few points, which are all used, and for
+// many.
 TEST(Variogram, DoesNotDependOnWhereAMeshIsFiner) {
   for (const int count : {60, 4000}) {
     Random random(5);
@@ -53,14 +53,14 @@ TEST(Variogram, DoesNotDependOnWhereAMeshIsFiner) {
     const auto by_weight = EmpiricalVariogram(points, values, weights, 20, 60);
     const auto finer = EmpiricalVariogram(split, of_split, {}, 20, 60);
     ASSERT_EQ(by_weight.size(), finer.size());
-    for (std::size_t k = 1; k < finer.size(); ++k) {  // the first has pairs of one place
+    for (std::size_t k = 1; k < finer.size(); ++k) {  // the first bin has pairs of one place
       EXPECT_NEAR(by_weight[k].semivariance_mm2, finer[k].semivariance_mm2,
                   count == 60 ? 1e-9 : 0.1 * finer[k].semivariance_mm2);
     }
   }
 }
 
-// One that weighs as much as all others together is in half of the pairs' weight.
+// A point that weighs as much as all others together is in half of the pairs' weight.
 TEST(Variogram, APointOfSeveralStepsCountsSoManyTimes) {
   std::vector<Vec3> points;
   std::vector<double> values, weights;
@@ -83,12 +83,12 @@ TEST(Variogram, FitFindsTheModelThatMadeIt) {
     bins.push_back({distance_mm, truth.At(distance_mm), 100 + 30 * k});
   }
   const VariogramModel found = FitVariogram(bins);
-  EXPECT_NEAR(found.length_mm, 17, 1);  // of lengths in ratios of 1.08
+  EXPECT_NEAR(found.length_mm, 17, 1);  // lengths are tried in ratios of 1.08
   EXPECT_NEAR(found.nugget_mm2, 1.5, 0.4);
   EXPECT_NEAR(found.sill_mm2, 20, 0.5);
 }
 
-// Noise that no neighbour shares is all nugget, of its variance.
+// Uncorrelated noise gives a nugget of its variance and no sill.
 TEST(Variogram, OfNoiseIsItsVariance) {
   Random random(3);
   std::vector<Vec3> points;

@@ -75,7 +75,8 @@ TEST(Kriging, CovariancesAreTheirFormulas) {
       std::exp(-1.0), (1 + std::sqrt(3.0)) * std::exp(-std::sqrt(3.0)),
       (1 + std::sqrt(5.0) + 5 / 3.) * std::exp(-std::sqrt(5.0)), std::exp(-0.5)};
   for (int k = 0; k < 4; ++k) {
-    // With a large nugget on both, the residual's share is c(0)-c(30) over that plus the nugget.
+    // With a large nugget on both, the residual's factor is c(0) - c(30) over c(0) - c(30) plus the
+    // nugget.
     const Kriging kriging{.covariance = static_cast<Covariance>(k),
                           .length_mm = 30,
                           .signal_mm = 1,
@@ -121,8 +122,8 @@ int StatedSds(const DepthField& field) {
       std::ranges::count_if(field.sd_mm, [](double sd) { return std::isfinite(sd); }));
 }
 
-// Its signal is then the least that is searched, and an sd of it some nanometres.
-TEST(Kriging, StatesNoSdWhereTheDowelsTellTheMeanAlone) {
+// Its signal is then at the lower bound, and its sd would be some nanometres.
+TEST(Kriging, StatesNoSdIfTheDowelsDetermineOnlyTheMean) {
   DowelScene one = FlatScene();
   one.dowels.resize(1);
   one.dowels[0].sd_mm = kNaN;
@@ -138,7 +139,7 @@ TEST(Kriging, StatesNoSdWhereTheDowelsTellTheMeanAlone) {
   EXPECT_GT(StatedSds(InterpolateDepth(relief, ScatteredScene(4).Input(), {})), 0);
 }
 
-// Ways that no space has: near to three dowels that are far from each other.
+// Distances that no Euclidean space has: near to three dowels that are far from each other.
 TEST(KrigingProcess, StatesNoSdWhereTheVarianceIsNegative) {
   KrigingData data{1000 * (Eigen::Matrix3d::Ones() - Eigen::Matrix3d::Identity()),
                    Eigen::Vector3d(4, 5, 6), Eigen::Vector3d::Zero(), Eigen::MatrixXd::Ones(3, 1)};
@@ -149,7 +150,7 @@ TEST(KrigingProcess, StatesNoSdWhereTheVarianceIsNegative) {
   EXPECT_TRUE(std::isfinite(near_all.mm));
   EXPECT_TRUE(std::isnan(near_all.sd_mm));
   EXPECT_GT(process.ValueAt(Eigen::Vector3d(10, 1000, 1000), one).sd_mm, 0.1);
-  // At a dowel, of which only one that the field goes through is certain.
+  // At a dowel the sd is 0 only if the field interpolates the dowel.
   EXPECT_TRUE(std::isnan(process.ValueAt(Eigen::Vector3d(0, 10, 10), one).sd_mm));
   data.depth_mm.setConstant(5);
   KrigingProcess through(Covariance::kSquaredExponential, data, {.length_mm = 30, .signal_mm = 2});
@@ -193,8 +194,9 @@ TEST_P(EveryCovariance, GradientOfTheDevianceEqualsItsNumericTwin) {
   }
 }
 
-// A long length makes the covariances as good as singular: what rounds below 0 is still 0.
-TEST_P(EveryCovariance, StatesAnSdEverywhereByStraightWays) {
+// A long length makes the covariances nearly singular; a variance that round-off makes negative is
+// 0.
+TEST_P(EveryCovariance, StatesAnSdEverywhereWithStraightDistances) {
   DowelScene scene = ScatteredScene(120);
   scene.network.areas.clear();
   for (const double length_mm : {20.0, 200.0, 2000.0}) {
@@ -239,7 +241,7 @@ TEST(KrigingFit, FindsTheLengthAndTheSignalOfManyDowels) {
   EXPECT_LT(lengths[1], 200);
 }
 
-TEST(KrigingFit, APriorHoldsTheLengthThatFewDowelsDoNotTell) {
+TEST(KrigingFit, APriorFixesTheLengthThatFewDowelsDoNotDetermine) {
   const DowelScene scene = ScatteredScene(5);
   const double held = ModelOf({.length_prior_spread = 0.05}, scene).length_mm;
   EXPECT_NEAR(held, 60, 6);
@@ -256,7 +258,7 @@ TEST(KrigingFit, KeepsWhatTheOptionsFix) {
   EXPECT_NEAR(ModelOf({.signal_mm = 1.5}, scene).signal_mm, 1.5, 1e-12);
 }
 
-// Without nuggets the best signal at a length is r'R^-1 r / (n - q), however long the length is.
+// Without nuggets the best signal^2 at any length is r'R^-1 r / (n - q).
 TEST_P(EveryCovariance, FitOfALongLengthFindsTheClosedForm) {
   const auto covariance = static_cast<Covariance>(GetParam());
   DowelScene scene = ScatteredScene(12);
@@ -284,10 +286,11 @@ TEST_P(EveryCovariance, FitOfALongLengthFindsTheClosedForm) {
   }
 }
 
-TEST(KrigingFit, SaysWhatItsRangeHeldBack) {
+TEST(KrigingFit, ReportsParametersAtTheirBounds) {
   DowelScene scene = ScatteredScene(12);
   EXPECT_TRUE(ModelOf({}, scene).at_end.empty());
-  for (std::size_t k = 0; k < scene.dowels.size(); ++k) {  // less unlike than they are uncertain
+  for (std::size_t k = 0; k < scene.dowels.size(); ++k) {  // differences smaller than their
+                                                           // uncertainty
     scene.dowels[k].depth_mm = k % 2 == 0 ? 9 : 11;
     scene.dowels[k].sd_mm = 1.5;
   }
@@ -344,9 +347,9 @@ TEST(KrigingFit, CoversTheDepthsOfItsOwnProcess) {
   EXPECT_NEAR(covered, 72, 7);  // 90 % of 80
 }
 
-// On the diagonal the stated deviations; off it what a further dowel would tell: it takes
-// cov(p, q)^2 / var(q) off the variance at p.
-TEST(Kriging, TheCovarianceIsWhatADowelThereWouldTell) {
+// The diagonal holds the stated variances. The other entries are the effect of another dowel at q,
+// which reduces the variance at p by cov(p, q)^2 / var(q).
+TEST(Kriging, TheCovarianceIsTheEffectOfAnotherDowel) {
   DowelScene scene = ScatteredScene(12);
   scene.network.areas.clear();
   const Kriging kriging{.length_mm = 25, .signal_mm = 3, .clamp = false};

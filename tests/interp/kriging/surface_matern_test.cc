@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Depth as a Matern field along the bone, against dense matrices; and the means of processes.
+// Depth as a Matern field along the bone, compared with dense matrices, and the means of processes.
 #include "interp/kriging/surface_matern.h"
 
 #include <gmock/gmock.h>
@@ -11,9 +11,7 @@
 
 #include "interp/interpolate_depth.h"
 #include "interp/kriging/gaussian_regression.h"
-#include "interp/kriging/surface_matern_likelihood.h"
 #include "interp/on_surface/bone_geometry.h"
-#include "interp/on_surface/bone_relief.h"
 #include "interp/on_surface/coarse_surface.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/dowel_scenes.h"
@@ -52,7 +50,8 @@ std::vector<Eigen::Index> VerticesOf(const DowelScene& scene) {
   return vertices;
 }
 
-// Correlations of all vertices from the definition; half_at_mm: as the option, 1e300 for none.
+// Correlations of all vertices from the definition. half_at_mm: half_at_relief_mm, or 1e300 for
+// none.
 Eigen::MatrixXd DenseCorrelations(const TriMesh& mesh, int alpha, double length_mm,
                                   double half_at_mm = 1e300) {
   const MeshLaplacian laplacian = BuildLaplacian(mesh);
@@ -73,7 +72,7 @@ Eigen::MatrixXd DenseCorrelations(const TriMesh& mesh, int alpha, double length_
 class EveryAlpha : public ::testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(SurfaceMatern, EveryAlpha, ::testing::Values(1, 2, 3));
 
-// The mean as one more Gaussian unknown of a variance without bounds, conditioned densely.
+// The mean as a further Gaussian unknown with a huge variance, conditioned with dense matrices.
 void ExpectPosterior(const DepthField& field, const DowelScene& scene,
                      const Eigen::MatrixXd& correlations) {
   constexpr double kVague = 1e4;
@@ -129,7 +128,7 @@ ReducedMatern CorrelationsOf(const DowelScene& scene, const SurfaceMatern& optio
   return {domain, weights, SearchPoles(options), {}};
 }
 
-// Minus twice the log density of all contrasts of the depths: what does not depend on the mean.
+// Minus twice the log density of all contrasts of the depths, which do not depend on the mean.
 TEST_P(EveryAlpha, CostIsTheGaussianDensityOfTheContrasts) {
   const DowelScene scene = SmallScene();
   const SurfaceMatern options{.alpha = GetParam(), .length_prior_spread = 1e9, .fit_nugget = true};
@@ -201,7 +200,7 @@ TEST_P(EveryAlpha, FitIsNoWorseThanAnyPointOfAGrid) {
   }
 }
 
-// As kriging's: a signal of many times the depths' spread where the length is long.
+// As in kriging, a long length needs a signal of many times the depths' spread.
 TEST_P(EveryAlpha, FitOfALongLengthIsNoWorseThanAnySignal) {
   const DowelScene scene = SmallScene();
   SurfaceMaternData data = DataOf(scene);
@@ -247,7 +246,7 @@ TEST(SurfaceMatern, OnAPieceWithoutADowelIsTheMeanWithTheFullSd) {
   EXPECT_LT(field.sd_mm.back(), 2);
 }
 
-TEST(SurfaceMatern, StatesNoSdWhereTheDowelsTellTheMeanAlone) {
+TEST(SurfaceMatern, StatesNoSdIfTheDowelsDetermineOnlyTheMean) {
   const auto states = [](const SurfaceMatern& options, std::size_t dowels) {
     DowelScene scene = SmallScene();
     scene.dowels.resize(dowels);
@@ -344,7 +343,7 @@ TEST_P(EveryMean, ASubjectThatIsTheTableTimesAFactorIsThatEverywhere) {
   }
 }
 
-// Of edges that are kept.
+// A wavy plate with edges longer than edge_mm, so that the coarse surface keeps them.
 TriMesh RoughPlate() {
   TriMesh plate = Plate(160, 40);
   for (Vec3& p : plate.points) {
@@ -386,7 +385,7 @@ TEST_P(EveryMean, DepthsThatFollowThePlaceInTheHeadDoSoEverywhere) {
     scene.dowels[k].site = k < sites.size() ? sites[k] : "d" + std::to_string(k);
     scene.dowels[k].base = scene.skull.points[113 * (k + 1)];
   }
-  const Eigen::MatrixXd geometry = BoneGeometry(scene.skull, FrameOfHead(scene.dowels));
+  const Eigen::MatrixXd geometry = BoneGeometry(scene.skull, FindHeadFrame(scene.dowels));
   const auto depth_at = [&](std::size_t v) {
     return 20 +
            Eigen::RowVector4d(0.3, 2, -1, 0.02).dot(geometry.col(static_cast<Eigen::Index>(v)));

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "interp/on_surface/bone_relief.h"
+#include "interp/on_surface/bone_geometry.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
@@ -78,7 +78,7 @@ TEST(CoarseSurface, HasAVertexForAPieceWithoutATriangle) {
   EXPECT_EQ(PointAt(coarse.mesh(), at), Vec3(0, 0, 90));
 }
 
-// (1 - r^2 Laplace) x = x (1 + 2 r^2 / R^2) on a sphere, so the smoothed one is smaller.
+// (1 - r^2 Laplace) x = x (1 + 2 r^2 / R^2) on a sphere, so that the smoothed sphere is smaller.
 TEST(BoneRelief, OfASphereIsItsShrinking) {
   const double radius = 50;
   const Eigen::MatrixXd relief =

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Selected inverses, and Matern fields on surfaces against closed forms and dense matrices.
+// Selected inverses, and Matern fields on surfaces, compared with closed forms and dense matrices.
 #include "interp/on_surface/matern_field.h"
 
 #include <gtest/gtest.h>
@@ -9,7 +9,6 @@
 #include <numbers>
 #include <tuple>
 
-#include "interp/on_surface/reduced_matern.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {
@@ -21,7 +20,7 @@ using testing::Plate;
 using testing::SameBytes;
 using testing::SphereMesh;
 
-MaternDomain DomainOf(const TriMesh& mesh) { return {mesh.points, BuildLaplacian(mesh)}; }
+MaternDomain MakeDomain(const TriMesh& mesh) { return {mesh.points, BuildLaplacian(mesh)}; }
 
 // Two pieces and a vertex of no triangle, with slivers and triangles without area.
 TriMesh RoughMesh() {
@@ -33,7 +32,7 @@ TriMesh RoughMesh() {
   return mesh;
 }
 
-// Of all vertices, from the definition.
+// The covariances of all vertices from the definition.
 Eigen::MatrixXd DenseCovariance(const MaternDomain& domain, int alpha, double kappa) {
   const Eigen::MatrixXd area = domain.laplacian.area_mm2.asDiagonal();
   const Eigen::MatrixXd k = kappa * kappa * area + Eigen::MatrixXd(domain.laplacian.stiffness);
@@ -60,7 +59,7 @@ int NearestVertex(const TriMesh& mesh, const Vec3& p) {
 
 TEST(SelectedInverse, IsTheDenseInverseAtVerticesAndEdges) {
   const TriMesh mesh = RoughMesh();
-  const MaternDomain domain = DomainOf(mesh);
+  const MaternDomain domain = MakeDomain(mesh);
   const Eigen::SparseMatrix<double> matrix = ShiftedStiffness(domain.laplacian, 0.01);
   const Eigen::SparseMatrix<double> selected =
       MeshSolver(mesh.points, matrix).SelectedInverse(matrix);
@@ -79,7 +78,7 @@ INSTANTIATE_TEST_SUITE_P(MaternField, EveryAlpha, ::testing::Values(1, 2, 3));
 
 TEST_P(EveryAlpha, CovariancesAreTheDenseOnes) {
   const TriMesh mesh = RoughMesh();
-  const MaternDomain domain = DomainOf(mesh);
+  const MaternDomain domain = MakeDomain(mesh);
   const MaternField field(domain, GetParam(), 0.08);
   const Eigen::MatrixXd dense = DenseCovariance(domain, GetParam(), 0.08);
   const std::vector<int> vertices = {0, 31, 120};
@@ -98,7 +97,7 @@ TEST_P(EveryAlpha, CovariancesAreTheDenseOnes) {
 }
 
 TEST_P(EveryAlpha, TheNumberOfThreadsDoesNotMatter) {
-  const MaternDomain domain = DomainOf(SphereMesh({0, 0, 0}, 30, 20));
+  const MaternDomain domain = MakeDomain(SphereMesh({0, 0, 0}, 30, 20));
   const MaternField field(domain, GetParam(), 0.1);
   std::vector<int> vertices(40);
   for (int k = 0; k < 40; ++k) {
@@ -114,7 +113,7 @@ TEST_P(EveryAlpha, TheNumberOfThreadsDoesNotMatter) {
 // gamma(nu) / (gamma(alpha) 4 pi kappa^(2 nu)): Lindgren, Rue & Lindstrom 2011, eq. 1.
 TEST(MaternField, FarFromABorderIsThePlanesMaternCovariance) {
   const TriMesh plate = Plate(160, 80);
-  const MaternDomain domain = DomainOf(plate);
+  const MaternDomain domain = MakeDomain(plate);
   const int center = NearestVertex(plate, {80, 80, 0});
   for (const int alpha : {2, 3}) {
     const double nu = alpha - 1, length_mm = 14, kappa = MaternKappa(alpha, length_mm);
@@ -137,7 +136,7 @@ TEST(MaternField, FarFromABorderIsThePlanesMaternCovariance) {
   }
 }
 
-// Left of a bend in the length the field is as with the one, right of it as with the other.
+// Left of a change of the length the field has the one length, right of it the other.
 TEST(MaternField, WhereTheLengthIsHalfTheCorrelationIsThatOfHalfTheLength) {
   const TriMesh plate = Plate(160, 160);
   const double length_mm = 16;
@@ -147,7 +146,7 @@ TEST(MaternField, WhereTheLengthIsHalfTheCorrelationIsThatOfHalfTheLength) {
   }
   for (const int alpha : {2, 3}) {
     const double nu = alpha - 1;
-    const MaternDomain domain = WithLengths(DomainOf(plate), share);
+    const MaternDomain domain = WithLengths(MakeDomain(plate), share);
     const MaternField field(domain, alpha, MaternKappa(alpha, length_mm));
     const int left = NearestVertex(plate, {40, 80, 0}), right = NearestVertex(plate, {120, 80, 0});
     const Eigen::MatrixXd columns =
@@ -169,7 +168,7 @@ TEST(MaternField, WhereTheLengthIsHalfTheCorrelationIsThatOfHalfTheLength) {
 
 TEST(MaternField, AtAStraightOpenBorderHasTwiceTheVariance) {
   const TriMesh plate = Plate(160, 80);
-  const MaternDomain domain = DomainOf(plate);
+  const MaternDomain domain = MakeDomain(plate);
   const Eigen::SparseMatrix<double> local =
       MaternField(domain, 2, MaternKappa(2, 14)).LocalCovariances();
   const int center = NearestVertex(plate, {80, 80, 0}), border = NearestVertex(plate, {80, 0, 0});
@@ -181,7 +180,7 @@ TEST(MaternField, AtAStraightOpenBorderHasTwiceTheVariance) {
 TEST(MaternField, OnASphereIsItsLegendreSeries) {
   const double radius = 50;
   const TriMesh sphere = SphereMesh({0, 0, 0}, radius, 60);
-  const MaternDomain domain = DomainOf(sphere);
+  const MaternDomain domain = MakeDomain(sphere);
   const int from = NearestVertex(sphere, {radius, 0, 0});
   for (const int alpha : {2, 3}) {
     const double kappa = MaternKappa(alpha, 40);
@@ -215,7 +214,7 @@ std::vector<double> Poles(int alpha) {
 
 TEST_P(EveryAlpha, ReducedCorrelationsAreThoseOfTheField) {
   const TriMesh sphere = SphereMesh({0, 0, 0}, 60, 24);
-  const MaternDomain domain = DomainOf(sphere);
+  const MaternDomain domain = MakeDomain(sphere);
   const Eigen::MatrixXd weights = UnitColumns(std::ssize(sphere.points), {5, 130, 411, 600, 777});
   const ReducedMatern reduced(domain, weights, Poles(GetParam()), {});
   for (double length_mm = 6; length_mm < 500; length_mm *= 1.7) {
@@ -232,7 +231,7 @@ TEST_P(EveryAlpha, ReducedCorrelationsAreThoseOfTheField) {
 TEST_P(EveryAlpha, DerivativeOfReducedCorrelationsEqualsItsNumericTwin) {
   const TriMesh sphere = SphereMesh({0, 0, 0}, 60, 24);
   const Eigen::MatrixXd weights = UnitColumns(std::ssize(sphere.points), {5, 130, 411, 600});
-  const ReducedMatern reduced(DomainOf(sphere), weights, Poles(GetParam()), {});
+  const ReducedMatern reduced(MakeDomain(sphere), weights, Poles(GetParam()), {});
   constexpr double kStep = 1e-4;
   for (const double length_mm : {12.0, 60.0, 200.0}) {
     const Eigen::MatrixXd numeric = (reduced.At(GetParam(), length_mm * std::exp(kStep)).value -

@@ -9,7 +9,6 @@
 
 #include "interp/on_surface/mesh_laplacian.h"
 #include "interp/on_surface/mesh_solver.h"
-#include "interp/schemes/biharmonic.h"
 #include "interp/schemes/harmonic.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
@@ -37,7 +36,7 @@ TEST(MeshLaplacian, GivesTheDirichletEnergyOfALinearFunctionAndTheArea) {
   const TriMesh plate = Plate(40, 20);
   const MeshLaplacian laplacian = BuildLaplacian(plate);
   const Eigen::VectorXd u = Values(plate, [](const Vec3& p) { return 2 * p.x() + p.y(); });
-  EXPECT_NEAR(u.dot(laplacian.stiffness * u), 5 * 1600, 10);  // but for the least edge weights
+  EXPECT_NEAR(u.dot(laplacian.stiffness * u), 5 * 1600, 10);  // except for the minimum edge weights
   EXPECT_NEAR(laplacian.area_mm2.sum(), 1600, 1e-9);
   EXPECT_NEAR((laplacian.stiffness * Eigen::VectorXd::Ones(u.size())).norm(), 0, 1e-12);
 }
@@ -67,7 +66,7 @@ TEST(MeshLaplacian, StaysFiniteAndNegativeOffTheDiagonalOnSliversAndDegenerateTr
   EXPECT_GT(laplacian.area_mm2.minCoeff(), 0);
 }
 
-TEST(LabelComponents, AreThoseOfTheTriangles) {
+TEST(LabelPieces, AreThoseOfTheTriangles) {
   TriMesh mesh = Plate(10, 2);
   const TriMesh other = Plate(10, 1);
   for (const Triangle& t : other.triangles) {
@@ -75,7 +74,7 @@ TEST(LabelComponents, AreThoseOfTheTriangles) {
   }
   mesh.points.insert(mesh.points.end(), other.points.begin(), other.points.end());
   mesh.points.emplace_back(0, 0, 9);
-  EXPECT_THAT(LabelComponents(BuildLaplacian(mesh).stiffness),
+  EXPECT_THAT(LabelPieces(BuildLaplacian(mesh).stiffness),
               ::testing::ElementsAre(0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2));
 }
 
@@ -128,7 +127,7 @@ TEST(Harmonic, MeetsTheDowelsInTheMeanOverTheirRadius) {
       sum += near ? area[i] * field.depth_mm[i] : 0;
       weight += near ? area[i] : 0;
     }
-    EXPECT_NEAR(sum / weight, dowel.depth_mm, 0.2);  // the clamp takes some
+    EXPECT_NEAR(sum / weight, dowel.depth_mm, 0.2);  // the clamp cuts off some
   }
 }
 
@@ -142,8 +141,8 @@ TEST(Harmonic, AtRadiusZeroMeetsTheDowels) {
 }
 
 TEST(Biharmonic, ReproducesTheBendOfABeam) {
-  // Free borders: along x, u'''' = 0 between supports and u' = 0 at both ends (the Laplacian of a
-  // mesh with open borders knows no other slope there).
+  // Free borders: along x, u'''' = 0 between supports, and u' = 0 at both ends (the only slope at
+  // open borders of a mesh's Laplacian).
   DowelScene scene = Strip(4, 9);
   const DepthField field = InterpolateDepth(Biharmonic{}, scene.Input(), RunContext{});
   for (std::size_t i = 0; i < field.depth_mm.size(); ++i) {
@@ -162,7 +161,7 @@ TEST(Biharmonic, IsSmootherAtADowelThanHarmonic) {
       ring.insert(t.begin(), t.end());
     }
   }
-  const auto spike = [&](const DepthField& field) {  // over the mean of its ring
+  const auto spike = [&](const DepthField& field) {  // relative to the mean of its ring
     double sum = 0;
     for (const int i : ring) {
       sum += field.depth_mm[i] - field.depth_mm[at];
@@ -211,7 +210,7 @@ TEST(MeshSplines, SoftnessLeadsToTheMean) {
   }
 }
 
-TEST(MeshSplines, DoNotHeedADowelGivenTwice) {  // 64 and 65 dowels are solved in two ways
+TEST(MeshSplines, IgnoreARepeatedDowel) {  // 64 and 65 dowels use different methods
   DowelScene scene = FlatScene();
   Random random(5);
   scene.dowels.clear();
@@ -229,16 +228,16 @@ TEST(MeshSplines, DoNotHeedADowelGivenTwice) {  // 64 and 65 dowels are solved i
   }
 }
 
-// The one factor for all folds gives what a solve without the fold's dowels gives.
+// One factorisation for all folds gives the result of a solve without the fold's dowels.
 TEST(MeshSplines, LeftOutAreAsIfTheDowelHadNotBeenThere) {
-  for (const int count : {12, 66}) {  // more than 64 are solved in another way
+  for (const int count : {12, 66}) {  // more than 64 use another method
     const DowelScene scene = ScatteredScene(count);
     const Folds folds = {{3}, {0, 7}};
     const auto check = [&](const auto& scheme) {
       const auto fields = InterpolateLeftOut(scheme, scene.Input(), folds, RunContext{});
       ASSERT_EQ(fields.size(), folds.size());
       for (std::size_t f = 0; f < folds.size(); ++f) {
-        const ShownDowels shown = Without(scene.Input(), folds[f]);
+        const ShownDowels shown = LeaveOutDowels(scene.dowels, scene.network, folds[f]);
         const DepthField whole = InterpolateDepth(
             scheme, {scene.skull, scene.normals, shown.dowels, shown.network}, RunContext{});
         for (std::size_t k = 0; k < folds[f].size(); ++k) {
@@ -254,7 +253,7 @@ TEST(MeshSplines, LeftOutAreAsIfTheDowelHadNotBeenThere) {
   }
 }
 
-TEST(MeshSplines, SayThatTheyNeedTriangles) {
+TEST(MeshSplines, ReportThatTheyNeedTriangles) {
   const DowelScene scene = FlatScene().At({{1, 2, 3}});
   try {
     InterpolateDepth(Biharmonic{}, scene.Input(), RunContext{});

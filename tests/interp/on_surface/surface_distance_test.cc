@@ -130,7 +130,7 @@ TEST(GeodesicSchemes, LeavePiecesWithoutADowel) {
   }
 }
 
-TEST(GeodesicSchemes, KrigingHonoursCertainDowelsAlongTheBone) {
+TEST(GeodesicSchemes, KrigingInterpolatesCertainDowelsAlongTheBone) {
   DowelScene scene = BackToBack();
   scene.dowels.push_back({"po", {10, 30, 0}, {0, 0, 1}, 7, kNaN});
   const Kriging certain{.distance = DowelDistance::kGeodesic, .nugget_share = 0};
@@ -157,7 +157,7 @@ TEST(GeodesicSchemes, OnAPlaneAreTheStraightOnes) {
   }
 }
 
-TEST(GeodesicSchemes, SayThatTheyNeedTriangles) {
+TEST(GeodesicSchemes, ReportThatTheyNeedTriangles) {
   const DowelScene scene = FlatScene().At({{1, 2, 3}});
   try {
     InterpolateDepth(Nearest{.distance = DowelDistance::kGeodesic}, scene.Input(), RunContext{});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "interp/schemes/barycentric.h"
+#include "interp/schemes/network_schemes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -73,7 +73,8 @@ TEST(Barycentric, LinearDepthsOnAPlaneAreReproduced) {
   }
 }
 
-// Thesis 2.2 word for word: M p_c = -D, then the line through p and p_c cut with the bases' plane.
+// Thesis 2.2 literally: M p_c = -D, then the intersection of the line through p and p_c with the
+// bases' plane.
 Vec3 ThesisProjection(const DowelScene& scene, const Vec3& p) {
   const std::vector<Dowel>& d = scene.dowels;
   Mat3 m;
@@ -125,8 +126,8 @@ TEST(Barycentric, ParallelDirectionsProjectAlongThem) {
   }
 }
 
-// Directions twisted around the axis: the cutting planes share the axis' direction, so they meet in
-// no point, yet no two dowels are parallel and none runs along the axis.
+// Directions twisted around the axis. The cutting planes share the direction of the axis and have
+// no common point, although no two dowels are parallel and none runs along the axis.
 std::array<Vec3, 3> Twisted(const DowelScene& scene, double tilt) {
   const Vec3 axis(0, 0, 1);
   std::array<Vec3, 3> directions;
@@ -173,7 +174,7 @@ TEST(Barycentric, BoneBeyondTheMeetOfThePlanesIsOutside) {
                                                    DepthStatus::kAssigned));
 }
 
-TEST(Barycentric, HonoursTheDowelsAtTheirBases) {
+TEST(Barycentric, InterpolatesTheDowelsAtTheirBases) {
   const DowelScene scene = DomeScene();
   std::vector<Vec3> bases;
   for (const Dowel& dowel : scene.dowels) {
@@ -357,7 +358,7 @@ TEST(Barycentric, NeedsAnArea) {
   scene.network.areas.clear();
   EXPECT_EQ(ErrorOf(scene),
             "dowel network: there is no area, but barycentric depth needs at least one; place the "
-            "dowels of an area, or use scheme nearest or mean");
+            "dowels of an area, or use the scheme nearest or mean");
 }
 
 }  // namespace

@@ -106,7 +106,7 @@ TEST_F(DepthMapTest, IsUnassignedWhereTheMapHasNoneOrIsTooFar) {
   }
 }
 
-TEST_F(DepthMapTest, SaysWhatIsWrongWithAFile) {
+TEST_F(DepthMapTest, ReportsAFaultyFile) {
   EXPECT_EQ(ErrorOf({}), "depth_map: no file is named; give a PLY or CSV with a depth per vertex");
   EXPECT_THAT(ErrorOf({.file = "map.obj"}), HasSubstr("neither .ply nor .csv"));
   EXPECT_THROW(Field({.file = folder_ / "none.ply"}), IoError);

@@ -92,8 +92,7 @@ TEST_P(NaturalNeighbours, AreContinuousOnACurvedBone) {
   }
 }
 
-// Sibson's depth from all dowels there are, by clipping each one's part: quadratic, but leaves none
-// out.
+// Sibson's depth from all dowels by clipping each dowel's part: quadratic time, but complete.
 double DepthFromAll(const std::vector<Dowel>& dowels, const Vec3& p, const Vec3& normal) {
   const Vec3 first = normal.unitOrthogonal(), second = normal.cross(first);
   std::vector<PowerSite> sites;
@@ -120,7 +119,8 @@ TEST(NaturalNeighbour, LeavesOutNoDowelThatHasAPart) {
     normals.push_back(Vec3(random.Uniform(-0.5, 0.5), -1, random.Uniform(-0.5, 0.5)).normalized());
     points.push_back(90 * normals.back());
   }
-  for (const int count : {20, 60, 300}) {  // of 300, only the nearest of each are in order
+  for (const int count : {20, 60, 300}) {  // 300 dowels, of which only the nearest of each are
+                                           // sorted
     DowelScene scene = ScatteredScene(count).At(points);
     scene.normals = normals;
     const DepthField field = InterpolateDepth(NaturalNeighbour{}, scene.Input(), RunContext{});

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What network_spline promises beyond the laws of every scheme: no creases where barycentric has
+// Properties of network_spline beyond the laws of every scheme: no creases where barycentric has
 // them.
-#include "interp/schemes/network_spline.h"
+#include "interp/schemes/network_schemes.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "interp/schemes/barycentric.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
@@ -36,8 +35,8 @@ std::pair<double, double> SlopesAcross(const DowelScene& scene, const Scheme& sc
 
 constexpr NetworkSpline kFree{.clamp = false};
 
-// The dome's shared edges n - mso_r, n - mso_l, sg - n and n - me, and what stands across their
-// cutting planes.
+// The dome's shared edges n - mso_r, n - mso_l, sg - n and n - me, and the normals of their cutting
+// planes.
 struct Crossing {
   Vec3 p, normal;
 };
@@ -85,7 +84,7 @@ TEST(NetworkSpline, IsSmoothWithinAnAreaAndAtItsDowels) {
     const auto [one, other] = SlopesAcross(scene, kFree, p, way);
     EXPECT_NEAR(one, other, 2e-5);
   }
-  // Along both ways out of a dowel inside the network: n of the dome.
+  // In both directions away from a dowel inside the network, the dome's n.
   const DowelScene dome = DomeScene();
   for (const Vec3& way : {Vec3(1, 0, 0), Vec3(0.6, 0, 0.8), Vec3(-0.6, 0, 0.8)}) {
     const auto [one, other] = SlopesAcross(dome, kFree, dome.dowels[3].base, way);
@@ -111,8 +110,8 @@ TEST(NetworkSpline, LinearDepthsOnAPlaneAreReproducedAlsoWithObliqueDowels) {
   }
 }
 
-// With all four dowels of a square on a paraboloid the diagonal's cubic bends as the data say,
-// where barycentric is flat.
+// With the four dowels of a square on a paraboloid the diagonal's cubic bends like the data, where
+// barycentric is flat.
 TEST(NetworkSpline, IsCloserToACurvedDepthThanBarycentric) {
   DowelScene scene;
   const auto depth = [](const Vec3& p) { return 6 + p.squaredNorm() / 200; };
@@ -154,7 +153,7 @@ TEST(NetworkSpline, NeedsAnArea) {
   } catch (const InputError& e) {
     EXPECT_STREQ(e.what(),
                  "dowel network: there is no area, but network_spline depth needs at least one; "
-                 "place the dowels of an area, or use scheme nearest or mean");
+                 "place the dowels of an area, or use the scheme nearest or mean");
   }
 }
 

@@ -4,7 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "interp/schemes/barycentric.h"
+#include "interp/schemes/network_schemes.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "surfaces/mesh/point_triangle.h"

@@ -89,7 +89,7 @@ TEST(PowerCell, TreeAndClippingGiveTheSameParts) {
 }
 
 TEST(PowerCell, ASiteWhosePartLiesWhollyInsideIsFound) {
-  // Four on a circle, and one straight over the point: its part is the middle of the cell.
+  // Four sites on a circle, and one directly above the point, whose part is the middle of the cell.
   const std::vector<PowerSite> sites = {
       {{10, 0}, 100}, {{0, 10}, 100}, {{-10, 0}, 100}, {{0, -10}, 100}, {{0.1, 0}, 20}};
   const CellPolygon cell = CellOf(sites);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What inverse_distance, radial_basis and moving_least_squares add to the laws of every scheme.
+// Properties of inverse_distance, radial_basis and moving_least_squares beyond the laws of every
+// scheme.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -48,15 +49,15 @@ TEST(DowelSamples, OfOnePlaceBecomeTheirMean) {
 
 TEST(SampleFrame, HasTheDirectionsInWhichThePointsSpread) {
   DowelScene scene = FlatScene();
-  const SampleFrame plane = FrameOf(DepthSamples(scene.dowels));
+  const SampleFrame plane = FindSampleFrame(DepthSamples(scene.dowels));
   EXPECT_EQ(plane.axes.size(), 2u);
   EXPECT_NEAR(plane.size_mm, 15 * std::sqrt(2), 1e-12);
   EXPECT_NEAR((plane.center - Vec3(20, 20, 0)).norm(), 0, 1e-12);
-  EXPECT_EQ(FrameOf(DepthSamples(DomeScene().dowels)).axes.size(), 3u);
+  EXPECT_EQ(FindSampleFrame(DepthSamples(DomeScene().dowels)).axes.size(), 3u);
   scene.dowels.resize(2);
-  EXPECT_EQ(FrameOf(DepthSamples(scene.dowels)).axes.size(), 1u);
+  EXPECT_EQ(FindSampleFrame(DepthSamples(scene.dowels)).axes.size(), 1u);
   scene.dowels.resize(1);
-  EXPECT_TRUE(FrameOf(DepthSamples(scene.dowels)).axes.empty());
+  EXPECT_TRUE(FindSampleFrame(DepthSamples(scene.dowels)).axes.empty());
 }
 
 TEST(ScatteredSchemes, WorkWithOneDowelAndWithTwoInOnePlace) {

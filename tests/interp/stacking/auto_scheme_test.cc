@@ -38,7 +38,7 @@ TEST(AutoScheme, WithOneSchemeIsThatScheme) {
   }
 }
 
-TEST(AutoScheme, IsTheWeightedMeanOfItsSchemesAndSaysTheWeights) {
+TEST(AutoScheme, IsTheWeightedMeanOfItsSchemesAndReportsTheWeights) {
   const DowelScene scene = ScatteredScene(20);
   const AutoScheme options{.schemes = {Kriging{}, InverseDistance{}, Mean{}}};
   const DepthField field = InterpolateDepth(options, scene.Input(), {});
@@ -59,7 +59,7 @@ TEST(AutoScheme, IsTheWeightedMeanOfItsSchemesAndSaysTheWeights) {
   }
 }
 
-TEST(AutoScheme, TakesTheOneThatPredictsLeftOutDowelsBest) {
+TEST(AutoScheme, ChoosesTheBestPredictorOfLeftOutDowels) {
   const DowelScene scene = ScatteredScene(40);
   const DepthField field = InterpolateDepth(
       AutoScheme{.schemes = {Mean{}, Kriging{}, Nearest{}}, .takes = AutoTakes::kBest},
@@ -85,7 +85,7 @@ std::vector<std::string> NamesOfShares(const std::vector<SingleScheme>& schemes)
   return names;
 }
 
-TEST(AutoScheme, NamesASchemeThatStandsThereTwiceByItsOptions) {
+TEST(AutoScheme, NamesARepeatedSchemeByItsOptions) {
   EXPECT_THAT(NamesOfShares(AutoScheme{}.schemes),
               ElementsAre("radial_basis", "kriging", "kriging matern_5_2"));
   EXPECT_THAT(
@@ -97,7 +97,7 @@ TEST(AutoScheme, NamesASchemeThatStandsThereTwiceByItsOptions) {
               ElementsAre("kriging length_mm 30 no clamp", "kriging"));
 }
 
-TEST(AutoScheme, PassesOverSchemesOnANetworkThatIsNotThere) {
+TEST(AutoScheme, SkipsSchemesOnAMissingNetwork) {
   DowelScene scene = DomeScene();
   scene.network.areas.clear();
   const DepthField field = InterpolateDepth(
@@ -106,9 +106,10 @@ TEST(AutoScheme, PassesOverSchemesOnANetworkThatIsNotThere) {
   EXPECT_EQ(field.shares[0].scheme, "nearest");
 }
 
-// A rough field, whose roughness the dowels show: the stated sd holds on bone between them.
-// Each of three dowels left out leaves two, which do not tell a mean of three factors.
-TEST(AutoScheme, PassesOverSchemesThatTooFewDowelsAreLeftFor) {
+// A rough field whose roughness is visible in the dowels: the stated sd is correct for the bone
+// between them. With one of three dowels left out, two remain, which cannot determine a mean of
+// three factors.
+TEST(AutoScheme, SkipsSchemesWithTooFewRemainingDowels) {
   const DowelScene scene = ScatteredScene(3);
   const Kriging relief{.mean = DepthMean::kCovariates};
   const DepthField field =

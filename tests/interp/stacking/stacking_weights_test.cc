@@ -46,7 +46,7 @@ TEST(StackingWeights, AreOfSumOneAndNoneBelowZero) {
   }
 }
 
-// Against every point of a fine grid on the triangle of weights.
+// Compared with every point of a fine grid on the triangle of weights.
 TEST(StackingWeights, AreTheBestOfAllMixtures) {
   constexpr int kGrid = 200;
   for (int seed = 0; seed < 30; ++seed) {
@@ -86,7 +86,7 @@ TEST(StackingWeights, BecomeEqualWithCaution) {
   EXPECT_LT((weights.array() - 0.25).abs().maxCoeff(), 1e-4);
 }
 
-TEST(StackingWeights, OfTwinsAndOfExactOnesAreWeightsStill) {
+TEST(StackingWeights, AreValidForTwinsAndExactPredictors) {
   Eigen::MatrixXd twins = Drawn(10, 3, 2);
   twins.col(1) = twins.col(0);
   const Eigen::VectorXd weights = Weights(twins, 0);
@@ -96,7 +96,7 @@ TEST(StackingWeights, OfTwinsAndOfExactOnesAreWeightsStill) {
   EXPECT_EQ(Weights(Drawn(7, 1, 1), 0.1), Eigen::VectorXd::Ones(1));
 }
 
-TEST(StackedErrors, AreOfWeightsThatDoNotKnowThePoint) {
+TEST(StackedErrors, UseWeightsFromTheOtherPoints) {
   const Eigen::MatrixXd errors = Drawn(8, 3, 4);
   const Eigen::VectorXd stacked = StackedErrors(errors, Alike(errors), 0.1);
   const Eigen::MatrixXd others = errors.bottomRows(7);

@@ -7,10 +7,10 @@
 #include <chrono>
 #include <thread>
 
-#include "problems/output/manifest.h"
 #include "problems/pipeline/implicit_cache.h"
 #include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_folder.h"
 

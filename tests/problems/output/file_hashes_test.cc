@@ -6,8 +6,8 @@
 #include <chrono>
 #include <filesystem>
 
-#include "problems/output/manifest.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_folder.h"
 

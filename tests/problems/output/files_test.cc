@@ -14,8 +14,8 @@
 #include <iterator>
 #include <thread>
 
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/temporary_files.h"
 
 namespace semblance {
 namespace {

@@ -7,10 +7,10 @@
 
 #include <array>
 
-#include "problems/output/manifest.h"
 #include "problems/output/staged_folder.h"
 #include "problems/report/run_folder.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance {

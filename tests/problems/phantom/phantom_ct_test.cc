@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "tests/testing/scratch_file.h"
-#include "tests/testing/signed_volume.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {

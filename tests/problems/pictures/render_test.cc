@@ -17,7 +17,6 @@
 #include "surfaces/mesh_files/srgb.h"
 #include "tests/testing/pixels.h"
 #include "tests/testing/shapes.h"
-#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

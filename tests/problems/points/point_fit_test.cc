@@ -20,7 +20,8 @@
 #include "problems/points/fit_report.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
-#include "tests/testing/point_csv.h"
+#include "surfaces/hspline_query/tessellate.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
 

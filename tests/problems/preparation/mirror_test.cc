@@ -12,7 +12,7 @@
 #include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scratch_file.h"
-#include "tests/testing/signed_volume.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {

@@ -5,12 +5,11 @@
 
 #include <algorithm>
 
-#include "surfaces/hspline_files/cad_export.h"
-#include "surfaces/hspline_files/feature.h"
+#include "surfaces/hspline/feature.h"
+#include "surfaces/hspline/hspline_surface.h"
+#include "surfaces/hspline_files/face_export.h"
 #include "surfaces/hspline_files/hspline_json.h"
-#include "surfaces/hspline_files/surface_export.h"
-#include "surfaces/hspline_query/adaptive_tessellation.h"
-#include "surfaces/hspline_query/curvature.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
 #include "tests/testing/program_call.h"

@@ -14,7 +14,6 @@
 #include <thread>
 
 #include "surfaces/base/error.h"
-#include "surfaces/base/out_of_memory.h"
 
 namespace semblance {
 namespace {

@@ -12,20 +12,19 @@
 #include <vector>
 
 #include "problems/output/given_files.h"
-#include "problems/output/manifest.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
-#include "tests/testing/grid_mesh.h"
-#include "tests/testing/point_csv.h"
 #include "tests/testing/program_call.h"
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {

@@ -12,7 +12,6 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
-#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

@@ -16,7 +16,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// What reading the whole text and all its cells as numbers complains about.
+// The error message of reading the whole text with all cells as numbers.
 std::string FaultOf(std::string_view text) {
   try {
     CsvReader csv(text, "t.csv");
@@ -31,7 +31,7 @@ std::string FaultOf(std::string_view text) {
   return "";
 }
 
-TEST(Csv, WhatIsWrittenIsReadBackExactly) {
+TEST(Csv, AWrittenTableIsReadBackExactly) {
   const std::vector<double> numbers = {0.1, 1.0 / 3, 1e-300, -1e23, 5e-324, 12345678.9, -0.0};
   const std::vector<std::string> texts = {"plain",    "a, b", "say \"x\"", "two\nlines",
                                           " padded ", "",     "\r"};
@@ -51,7 +51,7 @@ TEST(Csv, WhatIsWrittenIsReadBackExactly) {
   EXPECT_FALSE(reader.NextRow());
 }
 
-TEST(Csv, ANumberThatIsNotThereIsAnEmptyCell) {
+TEST(Csv, AMissingNumberIsAnEmptyCell) {
   CsvWriter writer({"a", "b", "c", "d"});
   writer.Row(kNaN, std::numeric_limits<double>::infinity(), std::optional<double>(), true);
   EXPECT_EQ(writer.Text(), "a,b,c,d\n,,,1\n");
@@ -61,7 +61,7 @@ TEST(Csv, ANumberThatIsNotThereIsAnEmptyCell) {
   EXPECT_EQ(reader.NumberOrNan(3), 1);
 }
 
-TEST(Csv, TakesWhatSpreadsheetsWrite) {
+TEST(Csv, ReadsTablesOfSpreadsheets) {
   CsvReader reader(
       "\xEF\xBB\xBF"
       "a, b\r\n 1 ,\"2\" \r\n+3,-4e1",
@@ -74,7 +74,7 @@ TEST(Csv, TakesWhatSpreadsheetsWrite) {
   EXPECT_FALSE(reader.NextRow());
 }
 
-TEST(Csv, WhatIsWrongIsNamedWithItsLine) {
+TEST(Csv, FaultsNameTheirLine) {
   EXPECT_EQ(FaultOf("a,b\n1,2\n3\n"),
             "t.csv:3: 1 entries for 2 columns; give one entry per column");
   EXPECT_EQ(FaultOf("a,b\n\n"), "t.csv:2: the line is empty; leave it out");
@@ -89,8 +89,8 @@ TEST(Csv, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_THROW(reader.ColumnOf("c"), IoError);
 }
 
-// Half a million names are told apart at once, not each from each.
-TEST(Csv, ManyColumnsTakeTheirTurn) {
+// Half a million names are compared by a set, not pair by pair.
+TEST(Csv, ManyColumnNamesAreComparedQuickly) {
   std::string names = "c";
   for (int k = 0; k < 500'000; ++k) {
     names += ",c" + std::to_string(k);

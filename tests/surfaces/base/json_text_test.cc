@@ -21,7 +21,7 @@ std::string Nested(int levels, char open, char close) {
          std::string(static_cast<std::size_t>(levels), close);
 }
 
-TEST(JsonText, IsReadToSixtyFourLevelsAndNoFurther) {
+TEST(JsonText, IsReadToSixtyFourLevels) {
   EXPECT_NO_THROW(ParseJson(Nested(kDeepestJson, '[', ']'), "a"));
   for (const int levels : {kDeepestJson + 1, 1000, 1'000'000}) {
     EXPECT_THAT(WordsOf<IoError>([&] { ParseJson(Nested(levels, '[', ']'), "a.json"); }),
@@ -46,7 +46,7 @@ TEST(JsonText, BracketsInTextsAreNoLevels) {
   EXPECT_EQ(ParseJson(wide + "]", "a").size(), 1001u);
 }
 
-// For each new entry the library looks at all that there are.
+// The library compares each new entry with all others.
 TEST(JsonText, AnObjectHasFourThousandEntriesAtMost) {
   const auto object = [](int entries) {
     std::string text = "{";
@@ -60,7 +60,7 @@ TEST(JsonText, AnObjectHasFourThousandEntriesAtMost) {
               HasSubstr("a.json: an object of more than 4000 entries"));
 }
 
-TEST(JsonText, WhatIsNoJsonIsNamed) {
+TEST(JsonText, InvalidJsonIsReported) {
   for (const char* const text : {"", "{", "[1,]", "nan", "\"\xff\"", "]]}[", "::"}) {
     EXPECT_THAT(WordsOf<IoError>([&] { ParseJson(text, "a.json"); }),
                 HasSubstr("a.json: this is not JSON"));

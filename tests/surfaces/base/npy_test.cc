@@ -21,7 +21,7 @@ std::string Raw(const std::vector<Number>& values) {
   return {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(Number)};
 }
 
-// As numpy.save writes it: magic, version, length of the header, header, data.
+// The bytes that numpy.save writes: magic, version, length of the header, header, data.
 std::string Npy(const std::string& type, const std::string& shape, const std::string& data,
                 const std::string& fortran = "False", char version = 1) {
   const std::string header =
@@ -66,7 +66,7 @@ TEST(Npy, OrderIsTheLastIndexFastestWhateverTheFileHas) {
   EXPECT_THAT(c.values, ElementsAre(1, 2, 3, 4, 5, 6));
 }
 
-TEST(Npy, WhatCannotBeReadIsNamed) {
+TEST(Npy, UnreadableFilesAreReported) {
   EXPECT_THAT(FaultOf("PK\x03\x04 something else"), HasSubstr("a.npy: not a .npy file"));
   EXPECT_THAT(FaultOf(Npy("'|O'", "(1,)", "x")), HasSubstr("'|O'"));
   EXPECT_THAT(FaultOf(Npy("'>f8'", "(1,)", Raw<double>({1}))), HasSubstr("little-endian"));

@@ -20,7 +20,7 @@ std::size_t SumOfIndices(int threads) {
   return std::accumulate(values.begin(), values.end(), std::size_t{0});
 }
 
-// In a child, so that its limit is its own.
+// Runs the body in a child process, so that its memory limit does not affect the test.
 template <class Body>
 int CodeOfChild(const Body& body) {
   const pid_t child = ::fork();
@@ -38,7 +38,7 @@ TEST(ParallelFor, DoesEachIndexOnceForAnyNumberOfThreads) {
   }
 }
 
-TEST(ParallelFor, WorksWithTheThreadsThatTheSystemGives) {
+TEST(ParallelFor, WorksWithFewerThreadsThanRequested) {
   EXPECT_EQ(CodeOfChild([] {
               long pages = 0;
               std::ifstream("/proc/self/statm") >> pages;
@@ -51,7 +51,7 @@ TEST(ParallelFor, WorksWithTheThreadsThatTheSystemGives) {
             0);
 }
 
-TEST(ParallelFor, ThrowsWhatTheLowestBlockThrew) {
+TEST(ParallelFor, RethrowsTheExceptionOfTheLowestBlock) {
   try {
     ParallelFor(100, 4, 1, [](std::size_t i) {
       if (i == 20 || i == 70) {

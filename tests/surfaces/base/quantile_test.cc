@@ -37,7 +37,7 @@ TEST(Quantile, AWholeWeightIsARepetition) {
   }
 }
 
-// 0.3 * 10 and sums of 0.1 are not the whole numbers they stand for.
+// 0.3 * 10 and sums of 0.1 are not exact in binary.
 TEST(Quantile, RoundingDoesNotHideAMeeting) {
   const std::vector<double> values = {1, 2, 3, 4, 5, 6, 7, 8, 9, 10};
   const std::vector<double> tenths(10, 0.1);

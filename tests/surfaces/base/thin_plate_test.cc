@@ -16,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// Points within 100 mm of (300, -200, 50), as those of a scan, and where they go.
+// Points within 100 mm of (300, -200, 50), like those of a scan, and their targets.
 struct Pairs {
   std::vector<Vec3> from, to;
   std::vector<double> weights;
@@ -41,7 +41,7 @@ double Largest(const ThinPlate& plate, const Pairs& pairs) {
   return largest;
 }
 
-// What FitThinPlate says it minimises.
+// The cost that FitThinPlate minimises.
 double Cost(const ThinPlate& plate, const Pairs& pairs, double stiffness_mm) {
   double misfit = 0, bending = 0;
   for (std::size_t i = 0; i < pairs.from.size(); ++i) {
@@ -105,7 +105,7 @@ TEST(ThinPlate, NoOtherPlateOnTheSameCentersCostsLess) {
   const double least = Cost(best, pairs, stiffness_mm);
   Random random(11);
   for (int trial = 0; trial < 20; ++trial) {
-    // the difference of two plates is one that may be added
+    // adding the difference of two plates gives another valid plate
     Pairs moved = pairs;
     for (Vec3& p : moved.to) {
       p += random.InBox(-1, 1);
@@ -137,7 +137,7 @@ TEST(ThinPlate, StiffnessLeadsFromThePointsToTheAffineFitOfThem) {
   }
 }
 
-TEST(ThinPlate, WhatCannotBeSolvedIsSaidInOneLine) {
+TEST(ThinPlate, UnsolvableInputIsReportedInOneLine) {
   Pairs pairs = DrawnPairs(3, 1);
   EXPECT_THAT(FaultOf({}), HasSubstr("fewer than four"));
   EXPECT_THAT(FaultOf(pairs), HasSubstr("fewer than four"));

@@ -10,8 +10,6 @@
 #include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
-#include "tests/testing/shuffled.h"
-#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

@@ -26,7 +26,7 @@ Emitting RandomTriangle(Random& random) {
   return t;
 }
 
-// Thesis 3.1 and 3.2, by the closest point.
+// The emitters of thesis 3.1 and 3.2, computed from the closest point.
 double Emission(const Emitting& t, const Vec3& p, const Falloff& falloff) {
   const double height = (p - t.a).dot(t.normal);
   const Vec3 from = p - t.advance_mm * t.normal;
@@ -37,10 +37,10 @@ double Emission(const Emitting& t, const Vec3& p, const Falloff& falloff) {
   }
   if (height < t.advance_mm) {
     const bool over = std::abs(distance - (t.advance_mm - height)) < 1e-9;
-    return over ? kMostEmission : 0;
+    return over ? kMaxEmission : 0;
   }
   const double emission = t.gain * std::pow(std::max(distance, t.floor_mm), -falloff.power);
-  return emission < falloff.cut ? 0 : std::min(emission, kMostEmission);
+  return emission < falloff.cut ? 0 : std::min(emission, kMaxEmission);
 }
 
 class DistanceKernelTest : public ::testing::TestWithParam<Falloff> {};
@@ -59,13 +59,13 @@ TEST_P(DistanceKernelTest, EachLaneIsTheThesisAndTheSumIsTheLanes) {
       const Emitting t = triangles.emplace_back(RandomTriangle(random));
       lanes.Set(lane, t.a, t.b, t.c, t.normal, t.advance_mm, t.floor_mm, t.gain);
     }
-    const Vec3 p = n % 2 == 0 ? random.InBox(-9, 9) : random.InBox(-40, 40);  // out of reach too
+    const Vec3 p = n % 2 == 0 ? random.InBox(-9, 9) : random.InBox(-40, 40);  // also out of reach
     DistanceEmitterLanes::Lanes emission;
     for (int lane = 0; lane < DistanceEmitterLanes::kLanes; ++lane) {
       emission[lane] = EmitByDistance(lanes, lane, p, GetParam());
     }
     const std::vector<DistanceEmitterLanes> one = {lanes};
-    const std::vector<ReachBall> reaches = ReachBallsOf(one, GetParam());
+    const std::vector<ReachBall> reaches = MakeReachBalls(one, GetParam());
     const double sum = ((emission[0] + emission[1]) + (emission[2] + emission[3])) +
                        ((emission[4] + emission[5]) + (emission[6] + emission[7]));
     std::int64_t reaching = 0;
@@ -76,7 +76,7 @@ TEST_P(DistanceKernelTest, EachLaneIsTheThesisAndTheSumIsTheLanes) {
     EXPECT_GE(reaching, std::ranges::count_if(emission, [](double e) { return e > 0; }));
     EXPECT_LE(reaching, DistanceEmitterLanes::kLanes);
     EXPECT_EQ(sum_of({0, 0}), 2 * sum);
-    EXPECT_NEAR(sum_of({0, 0, 0, 0, 0}), 5 * sum, 1e-12 * sum);  // more balls than stand together
+    EXPECT_NEAR(sum_of({0, 0, 0, 0, 0}), 5 * sum, 1e-12 * sum);  // more balls than one pass takes
     for (int lane = 0; lane < DistanceEmitterLanes::kLanes; ++lane) {
       const double expected = lane < set ? Emission(triangles[lane], p, GetParam()) : 0;
       EXPECT_NEAR(emission[lane], expected, 1e-9 * expected) << n << " " << lane;

@@ -12,7 +12,7 @@
 namespace semblance {
 namespace {
 
-// Where the height counts, triangles are not moved.
+// Triangles are not moved if the falloff depends on the height.
 EmitterTriangle RandomEmitter(Random& random, const Falloff& falloff) {
   EmitterTriangle t;
   t.a = random.InBox(-4, 4);
@@ -25,7 +25,7 @@ EmitterTriangle RandomEmitter(Random& random, const Falloff& falloff) {
   return t;
 }
 
-// By the closest point of the triangle where it emits from.
+// Computed from the closest point of the triangle at its place of emission.
 double Emission(const EmitterTriangle& t, const Vec3& p, const Falloff& falloff) {
   const double height = (p - t.a).dot(t.normal);
   const Vec3 from = p - t.moved;
@@ -40,7 +40,7 @@ INSTANTIATE_TEST_SUITE_P(Falls, EmissionUpperBoundTest,
                          ::testing::Values(Falloff{6, 6, false, 0}, Falloff{3, 3, false, 0.01},
                                            Falloff{9, 9, true, 0}, Falloff{7.5, -1, true, 0}));
 
-// Wherever in the box a point is, it does not get more than the bound; and the bound is not idle.
+// No point of the box has a larger emission than the bound, and the bound is tight.
 TEST_P(EmissionUpperBoundTest, IsNotLessThanWhatAnyPointOfTheBoxGets) {
   Random random(31);
   int zeros = 0, near = 0;

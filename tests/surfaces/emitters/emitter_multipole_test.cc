@@ -13,7 +13,7 @@
 namespace semblance {
 namespace {
 
-// Triangles of a bumpy sheet that faces up, within 1 of the origin; sloped: of linear depth.
+// Triangles of a bumpy sheet that faces up, within 1 of the origin. sloped: with linear depth.
 std::vector<EmitterTriangle> Sheet(Random& random, int count, double bumps, bool sloped) {
   std::vector<EmitterTriangle> sheet;
   while (static_cast<int>(sheet.size()) < count) {
@@ -80,7 +80,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EmitterMultipoleTest,
                                            Kind{3, 0.2, false}, Kind{15, 0.1, false},
                                            Kind{6, 0.05, true}));
 
-// In front, beside where only some planes are faced, and behind; and the bound is not idle.
+// In front, beside (in front of some planes only), and behind; and the bound is tight.
 TEST_P(EmitterMultipoleTest, ErrsByNoMoreThanItsBound) {
   const auto [decay, bumps, sloped] = GetParam();
   const int power = decay + 3;
@@ -92,7 +92,7 @@ TEST_P(EmitterMultipoleTest, ErrsByNoMoreThanItsBound) {
     const int used = 1 + n % MultipoleLanes::kLanes;
     for (int lane = 0; lane < used; ++lane) {
       const std::vector<EmitterTriangle> part = Sheet(random, 1 + n % 3, bumps, sloped);
-      lanes[0].Set(lane, MultipoleOf(part, decay), power);
+      lanes[0].Set(lane, MakeMultipole(part, decay), power);
       sheet.insert(sheet.end(), part.begin(), part.end());
     }
     const Vec3 center = random.Uniform(5, 40) * random.InBox(-1, 1).normalized(),
@@ -102,7 +102,8 @@ TEST_P(EmitterMultipoleTest, ErrsByNoMoreThanItsBound) {
     for (int k = 0; k < 4; ++k) {
       const Vec3 p = center + half.cwiseProduct(random.InBox(-1, 1));
       const double exact = Emission(sheet, decay, p);
-      // Of the quadratures: with linear depth that of the moments, else only the one above.
+      // Error of the quadratures: of the moments with linear depth, otherwise only of the one
+      // above.
       const double slack = (sloped ? 1e-3 : 1e-4) * exact;
       EXPECT_NEAR(SumMultipoles(lanes, std::vector<std::int32_t>{0}, p, power), exact,
                   bound + slack)
@@ -116,11 +117,11 @@ TEST_P(EmitterMultipoleTest, ErrsByNoMoreThanItsBound) {
   EXPECT_GT(useful, bumps < 0.5 ? in_front / 3 : 0);
 }
 
-// The closer, the larger; in a larger box, the larger.
+// The bound grows towards the emitters and with the box.
 TEST(EmitterMultipole, BoundsGrowTowardsTheEmitters) {
   Random random(18);
   MultipoleLanes lanes;
-  lanes.Set(0, MultipoleOf(Sheet(random, 4, 0.1, false), 6), 9);
+  lanes.Set(0, MakeMultipole(Sheet(random, 4, 0.1, false), 6), 9);
   double last = 0;
   for (const double height : {40.0, 20.0, 10.0, 7.0}) {
     const double bound = lanes.ErrorInBox({1, 2, height}, Vec3::Constant(0.5), 9);
@@ -137,7 +138,7 @@ TEST(EmitterMultipole, ALaneThatWasNotSetIsNothing) {
   EXPECT_EQ(empty[0].ErrorInBox({1, 2, 3}, Vec3::Ones(), 9), 0);
 }
 
-// On a fine mesh most of what a point sums is far, and multipoles stand for many emitters each.
+// On a fine mesh most emitters are far from a point, and a multipole replaces many of them.
 TEST(EmitterMultipole, AFineMeshIsSummedByFewer) {
   const TriMesh sphere = testing::SphereMesh({0, 0, 0}, 60, 200);
   const std::vector<double> depth(sphere.points.size(), 8.0);

@@ -23,8 +23,7 @@ ImplicitSurface Surface(const TriMesh& mesh, double depth_mm, const Emitter& emi
                          {emitter, tail_error});
 }
 
-// Where the value crosses zero on the way from `inside` along `direction`; the outermost within
-// reach.
+// The outermost zero of the value along `direction` from `inside`, within reach.
 double CrossingHeight(const ImplicitSurface& surface, const Vec3& base, const Vec3& direction,
                       double reach_mm) {
   double low = 0, high = reach_mm;
@@ -39,8 +38,7 @@ double CrossingHeight(const ImplicitSurface& surface, const Vec3& base, const Ve
   return low;
 }
 
-// A plate of 280 mm with right triangles of the given leg; its middle. The tail beyond 1e-3 is left
-// out where that is quicker.
+// A plate of 280 mm of right triangles with the given leg. Larger tail errors save time.
 double PlateHeight(double depth_mm, double edge_mm, const Emitter& emitter, double tail_error) {
   const ImplicitSurface surface =
       Surface(Plate(280, static_cast<int>(280 / edge_mm)), depth_mm, emitter, tail_error);
@@ -110,7 +108,7 @@ TEST_P(EmitterLaws, MovesWithTheSkull) {
 
 TEST_P(EmitterLaws, ScalesWithTheSkullAndItsDepth) {
   const TriMesh sphere = SphereMesh({0, 0, 0}, 40, 12);
-  const Similarity fourfold{4, Mat3::Identity(), Vec3::Zero()};  // a power of 2 rounds nothing
+  const Similarity fourfold{4, Mat3::Identity(), Vec3::Zero()};  // a power of 2 causes no round-off
   const ImplicitSurface small = Surface(sphere, 8, GetParam()),
                         large = Surface(Transformed(sphere, fourfold), 32, GetParam());
   Random random(4);
@@ -179,7 +177,7 @@ void ExpectEmissionByParts(const FlatEmitter& emitter, const Vec3& depth_mm, dou
     const double emission = EmissionByParts(triangle, depth_mm, emitter.decay, p);
     EXPECT_NEAR((surface.Value(p) + 1) / emission, 1, within)
         << emitter.decay << ": " << p.transpose();
-    EXPECT_NEAR(surface.SumOf(all, p) / emission, 1, within) << p.transpose();
+    EXPECT_NEAR(surface.SumEmissions(all, p) / emission, 1, within) << p.transpose();
   }
 }
 
@@ -197,7 +195,7 @@ TEST(FlatEmitter, WithLinearDepthATriangleIsTheIntegralOfItsDepth) {
   }
 }
 
-// Over a plate whose depth rises by a tenth of the way: in each triangle the mean makes a step.
+// Over a plate whose depth rises with the slope 0.1; mean depths make a step at each triangle.
 TEST(FlatEmitter, WithLinearDepthASlopeHasNoSteps) {
   const TriMesh plate = Plate(160, 20);
   std::vector<double> depth;
@@ -244,7 +242,7 @@ TEST(ThesisEmitter, TheBoxOfInfluenceReachesToWhere500EmittersWouldMakeASurface)
     const Box3 box = surface.InfluenceBox(0, 500);
     EXPECT_NEAR((box.min() - Vec3(-reach_mm, -reach_mm, -reach_mm)).norm(), 0, 1e-5) << decay;
     EXPECT_NEAR((box.max() - Vec3(6 + reach_mm, 3 + reach_mm, reach_mm)).norm(), 0, 1e-5);
-    EXPECT_NEAR(surface.SumOf(only, {1, 1, box.max().z()}), 1.0 / 500, 1e-9);
+    EXPECT_NEAR(surface.SumEmissions(only, {1, 1, box.max().z()}), 1.0 / 500, 1e-9);
   }
 }
 
@@ -257,7 +255,8 @@ TEST(SplitEmitter, TheBoxOfInfluenceIsAroundTheMovedTriangleAndItsPrism) {
   const double reach_mm = 0.7 * 28.172691;
   EXPECT_NEAR((box.min() - Vec3(-reach_mm, -reach_mm, -reach_mm)).norm(), 0, 1e-5);
   EXPECT_NEAR((box.max() - Vec3(6 + reach_mm, 3 + reach_mm, 3 + reach_mm)).norm(), 0, 1e-5);
-  EXPECT_NEAR(surface.SumOf(std::vector<std::int32_t>{0}, {1, 1, box.max().z()}), 1.0 / 500, 1e-9);
+  EXPECT_NEAR(surface.SumEmissions(std::vector<std::int32_t>{0}, {1, 1, box.max().z()}), 1.0 / 500,
+              1e-9);
 }
 
 TEST(SplitEmitter, WithoutSplitItIsTheThesisEmitter) {
@@ -293,7 +292,7 @@ TEST(ImplicitSurface, TrianglesWithoutDepthDoNotEmit) {
   EXPECT_LT(surface.Value({85, 50, 4}), 0);
 }
 
-TEST(ImplicitSurface, RefusesDepthsThatAreNone) {
+TEST(ImplicitSurface, RefusesInvalidDepths) {
   const TriMesh plate = Plate(10, 1);
   EXPECT_THROW(ImplicitSurface(plate, std::vector<double>(3, 5), {}), InputError);
   EXPECT_THROW(ImplicitSurface(plate, std::vector<double>(4, -1), {}), InputError);

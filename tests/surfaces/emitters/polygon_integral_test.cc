@@ -16,7 +16,7 @@ namespace {
 
 using Corners = std::vector<Vec2>;  // counter-clockwise
 
-// The polygon as seen from a point over `foot`.
+// The polygon's edges relative to `foot`.
 std::vector<EdgeFromFoot> EdgesFrom(const Corners& corners, const Vec2& foot) {
   std::vector<EdgeFromFoot> edges;
   for (std::size_t k = 0; k < corners.size(); ++k) {
@@ -27,7 +27,7 @@ std::vector<EdgeFromFoot> EdgesFrom(const Corners& corners, const Vec2& foot) {
   return edges;
 }
 
-// Subdivision with the midpoint rule: slow, plain, and another way altogether.
+// Subdivision with the midpoint rule: slow, simple and independent of the closed form.
 double BruteForce(const Vec2& a, const Vec2& b, const Vec2& c, const Vec3& p, int n, int depth) {
   const Vec2 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
   if (depth == 0) {
@@ -59,7 +59,7 @@ TEST_P(PolygonIntegral, EqualsBruteForce) {
   }
 }
 
-// Over a corner, over an edge and over its line, where the terms by themselves have no limit.
+// Over a corner, an edge and the edge's line, where single terms have no limit.
 TEST_P(PolygonIntegral, IsFiniteOverCornersAndEdges) {
   const Corners triangle = {{0, 0}, {2, 0}, {0, 1}};
   for (const Vec2& foot : {Vec2(0, 0), Vec2(2, 0), Vec2(1, 0), Vec2(3, 0), Vec2(0, 0.25)}) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// H-splines down to level 8, against an oracle of another kind: the sum of the B-splines of all
-// levels, by the recursion that defines them.
+// H-splines down to level 8, compared with the sum of the B-splines of all levels, computed by
+// their defining recursion.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -29,7 +29,7 @@ double Cardinal(double x, int degree, int order) {
                            degree;
 }
 
-// S = sum over levels and vertices of (the vertex - what the coarser levels make of it) B(u,v).
+// S = sum over levels and vertices of (vertex - its value refined from the coarser level) B(u,v).
 class Oracle {
  public:
   explicit Oracle(const HSplineSurface& level0) : shape_(level0.shape()) {
@@ -52,7 +52,8 @@ class Oracle {
     return sum;
   }
 
-  // All of one level at once; levels in order. Vertices whose knots lie inside the domain.
+  // Sets all edits of one level at once, in order of levels. The vertices' knots lie inside the
+  // domain.
   void Add(int level, const std::map<VertexId, Vec3>& offsets) {
     std::map<VertexId, Vec3> parts;
     for (const auto& [id, offset] : offsets) {
@@ -91,7 +92,7 @@ class DeepHSpline : public ::testing::TestWithParam<HSplineShape> {
   static constexpr int kFinest = 8;
   const HSplineShape& shape() const { return GetParam(); }
 
-  // The vertex of a level nearest to a place.
+  // The vertex of a level whose Greville point is nearest to a (u,v).
   VertexId Near(int level, const Vec2& uv) const {
     return {
         level,
@@ -99,7 +100,7 @@ class DeepHSpline : public ::testing::TestWithParam<HSplineShape> {
         static_cast<int>(std::round(uv.y() * shape().PatchesV(level))) + 1};
   }
 
-  // On each level a few vertices about a place, and one elsewhere.
+  // Edits a few vertices per level around a (u,v), and one elsewhere.
   std::map<VertexId, Vec3> Detail(const Vec2& place) const {
     Random random(5);
     std::map<VertexId, Vec3> detail;
@@ -178,7 +179,7 @@ TEST_P(DeepHSpline, AnEditOfLevelEightMovesItsOverlayAndNotOneBitElsewhere) {
   Apply(Detail({0.37, 0.61}), before);
   HSplineSurface after = before;
   VertexId vertex = Near(kFinest, {0.52, 0.33});
-  vertex.i |= 1;  // odd: it lies on a vertex of level 7, the centre of an overlay
+  vertex.i |= 1;  // odd: it lies on a vertex of level 7, the center of an overlay
   vertex.j |= 1;
   after.SetOffsets({{vertex, Vec3(0, 0, 1)}});
   const Vec2 center = before.ParameterOf(vertex);
@@ -229,7 +230,7 @@ TEST_P(DeepHSpline, MemoryGrowsWithTheEditsNotWithTheLevel) {
   const double columns = shape().Columns(kFinest), rows = shape().Rows(kFinest);
   for (int edit = 0; edit < 20; ++edit) {
     surface.SetOffsets({{{kFinest, edit * 37 + 20, (edit * 71) % 900 + 20}, Vec3(0, 0, 1)}});
-    // A chain of at most 6 x 6 vertices a level, with what describes their columns.
+    // The memory of at most 6 x 6 vertices per level, and of the spans of their columns.
     EXPECT_LT(surface.Bytes(), before + 8 * (36 * sizeof(Vec3) + 6 * 40) + 200 +
                                    (edit == 0 ? 2 * 2 * 4 * columns + 4000 : 0));
     before = surface.Bytes();

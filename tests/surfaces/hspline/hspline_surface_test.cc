@@ -129,8 +129,7 @@ TEST_P(HSplineLaws, RefinementKeepsTheShape) {
 TEST_P(HSplineLaws, AnEditTouchesTheFourPatchesOfItsParentLevelAndNothingElse) {
   const HSplineSurface before = RandomSurface(shape(), 5);
   HSplineSurface after = before;
-  // odd: it lies on a vertex of level 1, the centre of an overlay; near the seams where there are
-  // any
+  // odd: it lies on a vertex of level 1, the center of an overlay, near any seams
   const VertexId vertex{2, shape().ClosedU() ? 1 : 9, 9};
   after.SetOffsets({{vertex, Vec3(0, 0, 5)}});
   const Vec2 center = ParameterOf(shape(), vertex);
@@ -143,7 +142,7 @@ TEST_P(HSplineLaws, AnEditTouchesTheFourPatchesOfItsParentLevelAndNothingElse) {
   for (int a = 0; a < 60; ++a) {
     for (int b = 0; b < 60; ++b) {
       const Vec2 uv((a + 0.5) / 60, (b + 0.5) / 60);
-      constexpr double kBorder = 1e-12;  // a border is of the patches on both sides
+      constexpr double kBorder = 1e-12;  // a border belongs to the patches on both sides
       const bool inside = apart(uv.x(), center.x(), shape().ClosedU()) < reach_u + kBorder &&
                           apart(uv.y(), center.y(), false) < reach_v + kBorder;
       const double moved = (after.Point(uv) - before.Point(uv)).norm();
@@ -222,7 +221,7 @@ TEST_P(HSplineLaws, DerivativesAgreeWithCentralDifferences) {
   }
 }
 
-TEST_P(HSplineLaws, DetailRidesAlongWithARigidMotionOfLevelZero) {
+TEST_P(HSplineLaws, DetailFollowsARigidMotionOfLevelZero) {
   const HSplineSurface before = RandomSurface(shape(), 8);
   const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, 2, 3).normalized()).toRotationMatrix();
   const Vec3 shift(10, -20, 30);
@@ -256,7 +255,7 @@ TEST_P(HSplineLaws, SettingANetBackChangesNoBit) {
   }
 }
 
-TEST_P(HSplineLaws, ANetThatIsSetIsTheNetThatIsGot) {
+TEST_P(HSplineLaws, ASetNetIsReadBack) {
   for (int level = 0; level <= shape().max_level; ++level) {
     HSplineSurface surface = RandomSurface(shape(), 10);
     const std::map<VertexId, Vec3> old = surface.Offsets();
@@ -351,7 +350,7 @@ TEST(HSpline, AnOffsetIsKeptInTheFrameOfTheCoarserSurface) {
   }
 }
 
-TEST(HSpline, AVertexInfluencesMostItsParameter) {
+TEST(HSpline, AVertexHasItsLargestInfluenceAtItsGrevillePoint) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     const HSplineShape shape{.patches_u = 4, .patches_v = 5, .max_level = 1, .closure = closure};
     const int border_u = shape.ClosedU() ? 0 : 1, border_v = 1;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // STEP and IGES are read back by OpenCASCADE and compared at random (u,v).
-#include "surfaces/hspline_files/cad_export.h"
+#include "surfaces/hspline_files/face_export.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -20,7 +20,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/random.h"
-#include "surfaces/hspline/patch_regions.h"
+#include "surfaces/hspline/patch_tree.h"
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 

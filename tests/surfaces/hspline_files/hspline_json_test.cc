@@ -13,6 +13,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
+#include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {
@@ -21,6 +22,7 @@ namespace {
 namespace fs = std::filesystem;
 using ::testing::HasSubstr;
 using testing::RandomSurface;
+using testing::ScratchFolder;
 
 const HSplineShape kShape{
     .patches_u = 4, .patches_v = 5, .max_level = 2, .closure = Closure::kPeriodicU};
@@ -81,13 +83,13 @@ TEST(HSplineJson, RefusesEveryOtherText) {
       HSplineFromJson(text, "a.json");
       ADD_FAILURE() << "accepted; expected: " << words;
     } catch (const IoError& e) {
-      EXPECT_THAT(e.what(), ::testing::StartsWith("a.json: not an H-spline that can be read: "));
+      EXPECT_THAT(e.what(), ::testing::StartsWith("a.json: not a readable H-spline: "));
       EXPECT_THAT(e.what(), ::testing::HasSubstr(words));
     }
   }
 }
 
-TEST(HSplineJson, SaysOfWhatIsNoObjectWhatAnHSplineIs) {
+TEST(HSplineJson, ExplainsWhatAnHSplineIsIfTheTextIsNoObject) {
   for (const char* text : {"", " \n", "[1]", "ply\nformat ascii 1.0\n"}) {
     EXPECT_THAT(testing::WordsOf<IoError>([&] { HSplineFromJson(text, "a.json"); }),
                 ::testing::AllOf(::testing::StartsWith("a.json: not an H-spline: "),
@@ -134,10 +136,48 @@ TEST_F(HSplineFile, ErrorsNameTheFile) {
   };
   EXPECT_THAT(message(), HasSubstr("broken.json: no such file"));
   WriteFileAtomically(path, "{\"format\": \"semblance-hspline\"");
-  EXPECT_THAT(message(), HasSubstr("broken.json: not an H-spline that can be read"));
+  EXPECT_THAT(message(), HasSubstr("broken.json: not a readable H-spline"));
   EXPECT_THROW(WriteHSpline(folder_ / "absent" / "x.json",
                             RandomSurface({.patches_u = 4, .patches_v = 4, .max_level = 1}, 1)),
                IoError);
+}
+
+TEST(FeatureJson, ALibraryKeepsEveryBit) {
+  const ScratchFolder folder;
+  const HSplineShape shape{.patches_u = 4, .patches_v = 5, .max_level = 3};
+  const Feature nose = ExtractFeature(RandomSurface(shape, 7), "nose");
+  const Feature ear = ExtractFeature(RandomSurface(shape, 8), "ear_l");
+  StoreFeature(folder / "library", nose);
+  StoreFeature(folder / "library", ear);
+  EXPECT_EQ(ReadFeatureLibrary(folder / "library"),
+            (std::map<std::string, Feature>{{"ear_l", ear}, {"nose", nose}}));
+}
+
+TEST(FeatureJson, FilesThatAreNotFeaturesAreNamedWithTheirFault) {
+  const ScratchFolder folder;
+  const std::string good = FeatureToJson(
+      ExtractFeature(RandomSurface({.patches_u = 4, .patches_v = 4, .max_level = 1}, 1), "nose"));
+  const auto complaint = [](const std::string& text) -> std::string {
+    try {
+      FeatureFromJson(text, "nose.json");
+    } catch (const IoError& e) {
+      return e.what();
+    }
+    return "accepted";
+  };
+  const auto with = [&](const std::string& old, const std::string& text) {
+    std::string copy = good;
+    return copy.replace(copy.find(old), old.size(), text);
+  };
+  EXPECT_EQ(complaint(good), "accepted");
+  EXPECT_THAT(complaint("{"), HasSubstr("nose.json"));
+  EXPECT_THAT(complaint(with("\"version\":1", "\"version\":2")), HasSubstr("version 2"));
+  EXPECT_THAT(complaint(with("\"units\"", "\"unit\"")), HasSubstr("unknown entry 'unit'"));
+  EXPECT_THAT(complaint(with("\"offsets\":[[1,", "\"offsets\":[[7,")), HasSubstr("on level 7"));
+  EXPECT_THAT(complaint(with("\"nose\"", "\"a/b\"")), HasSubstr("not a name"));
+  WriteFileAtomically(folder / "ear.json", good);
+  EXPECT_THROW(ReadFeatureLibrary(folder.Path()), IoError);
+  EXPECT_THROW(ReadFeatureLibrary(folder / "missing"), IoError);
 }
 
 }  // namespace

@@ -5,7 +5,6 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
-#include "tests/testing/plain_bspline.h"
 #include "tests/testing/splines.h"
 
 namespace semblance {

@@ -100,7 +100,7 @@ TEST(HSplineProject, ASurfaceInOnePointGivesItsDistance) {
   EXPECT_TRUE(found.uv.allFinite());
 }
 
-TEST(HSplineProject, RefusesWhatCannotBeUsed) {
+TEST(HSplineProject, RefusesInvalidInput) {
   const HSplineSurface surface = SmoothSurface(kOpen, 1);
   EXPECT_THROW(SurfaceProjector(surface).Project({0, kNaN, 0}), InputError);
   EXPECT_THROW(ProjectFrom(surface, Vec3::Zero(), {kNaN, 0}), InputError);

@@ -99,7 +99,8 @@ TEST(Polygonizer, EachOptimisationOfTheThesisSavesEvaluations) {
   EXPECT_GT(bounds.bound_evaluations, 0);
 }
 
-// Thesis 3.2.3. The corners' least is never below the ball's, so that no more boxes are looked at.
+// Thesis 3.2.3. The minimum at corners is never below the ball's bound, so that no more boxes are
+// visited.
 TEST(Polygonizer, TheThesissEmitterCacheSavesEvaluationsAndChangesNoBit) {
   const auto face = [](EmitterMinimum minimum) {
     const MinMaxOctree octree{.least_emission = 0.002, .minimum = minimum};
@@ -119,7 +120,7 @@ TEST(Polygonizer, TheThesissEmitterCacheSavesEvaluationsAndChangesNoBit) {
   EXPECT_LT(cached.counts.emitter_evaluations, 0.8 * double(corners.counts.emitter_evaluations));
 }
 
-TEST(Polygonizer, RefusesAGridThatIsNone) {
+TEST(Polygonizer, RefusesAnInvalidGrid) {
   const Skull skull = BumpySkull();
   const ImplicitSurface surface(skull.mesh, skull.depth_mm, {});
   for (const Polygonizer& polygonizer : kFaster) {
@@ -127,8 +128,8 @@ TEST(Polygonizer, RefusesAGridThatIsNone) {
   }
 }
 
-// Two balls far from each other, one of them within a shell that is open nowhere: four components.
-TEST_P(Agreement, NoComponentIsMissedWhereAllAreAsked) {
+// Two distant balls, one of them within a closed shell: four components.
+TEST_P(Agreement, NoComponentIsMissedIfAllAreRequested) {
   TriMesh mesh;
   for (const TriMesh& part : {SphereMesh({0, 0, 0}, 20, 14), SphereMesh({0, 0, 0}, 3, 6),
                               SphereMesh({45, 5, 3}, 6, 8), SphereMesh({1, 44, -9}, 1.5, 6)}) {
@@ -166,12 +167,12 @@ class Bounds : public ::testing::TestWithParam<Emitter> {
     double least_at_corner = std::numeric_limits<double>::infinity();
     for (int c = 0; c < 8; ++c) {
       const Vec3 corner = box.corner(static_cast<Box3::CornerType>(c));
-      least_at_corner = std::min(least_at_corner, surface.SumOf({&only, 1}, corner));
+      least_at_corner = std::min(least_at_corner, surface.SumEmissions({&only, 1}, corner));
     }
     for (int n = 0; n < 200; ++n) {
       const Vec3 share = random.InBox(-0.2, 1.2).cwiseMax(0).cwiseMin(1);  // corners and faces too
       const Vec3 p = box.min() + share.cwiseProduct(box.sizes());
-      const double emission = surface.SumOf({&only, 1}, p);
+      const double emission = surface.SumEmissions({&only, 1}, p);
       EXPECT_LE(bounds.least, emission) << p.transpose();
       EXPECT_GE(bounds.most, emission) << p.transpose();
       if (bounds.least_at_corner) {
@@ -180,7 +181,7 @@ class Bounds : public ::testing::TestWithParam<Emitter> {
     }
   }
 
-  int at_corner_ = 0;  // boxes whose least is at a corner
+  int at_corner_ = 0;  // boxes with the minimum at a corner
 };
 INSTANTIATE_TEST_SUITE_P(All, Bounds, ::testing::ValuesIn(kEmitters));
 INSTANTIATE_TEST_SUITE_P(Broken, Bounds, ::testing::Values(Emitter(FlatEmitter{4.5})));
@@ -200,7 +201,7 @@ TEST_P(Bounds, HoldEverywhereInABox) {
   EXPECT_GT(at_corner_, 20);
 }
 
-// The thesis's maximum at the closest point of the box is 0 here.
+// The thesis's maximum, at the closest point of the box, is 0 here.
 TEST_P(Bounds, HoldWhereTheClosestPointOfTheBoxIsBehindTheTriangle) {
   Random random(12);
   const TriMesh triangle{{{0.1, 0, -0.1}, {0, 0.1, 0}, {-0.1, -0.1, 0.1}}, {{0, 1, 2}}};

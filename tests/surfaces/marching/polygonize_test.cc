@@ -10,7 +10,6 @@
 #include "surfaces/implicit_face.h"
 #include "surfaces/marching/edge_intersections.h"
 #include "tests/testing/shapes.h"
-#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {
@@ -68,7 +67,8 @@ TEST(Polygonize, RegulaFalsiNeedsFewerEvaluations) {
   EXPECT_LT(3 * evaluations(EdgeSearch::kRegulaFalsi), evaluations(EdgeSearch::kBisection));
 }
 
-// Of a function that falls from positive at 0 to negative at 1, against 60 halvings.
+// The error for a function that falls from positive at 0 to negative at 1, compared with 60
+// bisections.
 void ExpectCrossing(const std::function<double(double)>& field, double within,
                     std::int64_t& evaluations) {
   double low = 0, high = 1;
@@ -83,7 +83,7 @@ void ExpectCrossing(const std::function<double(double)>& field, double within,
   }
 }
 
-// Where the curve bends one way the tolerance is kept; where it turns, nearly.
+// The tolerance is kept if the curve is convex or concave, and nearly kept at an inflection.
 TEST(SearchCrossing, IsWithinTheToleranceOnSmoothCurves) {
   Random random(31);
   std::int64_t evaluations = 0;
@@ -98,7 +98,7 @@ TEST(SearchCrossing, IsWithinTheToleranceOnSmoothCurves) {
   EXPECT_LT(evaluations, 3000 * 3 * 3);
 }
 
-// Each bends one way: a corner, a step that is cut off at one end, a power.
+// Convex or concave curves: a corner, a step that is cut off at one end, a power.
 TEST(SearchCrossing, IsWithinTheToleranceHoweverSharpTheBend) {
   Random random(32);
   std::int64_t evaluations = 0;
@@ -197,13 +197,13 @@ TEST(Polygonize, ThreadsChangeNoBit) {
   EXPECT_EQ(a.summary.edge_evaluations, b.summary.edge_evaluations);
 }
 
-TEST(Polygonize, ASurfaceThatLeavesTheGridIsOpenAndSaidToBe) {
+TEST(Polygonize, ASurfaceThatLeavesTheGridIsOpenAndReported) {
   const PolygonizeResult result = PolygonizeAll(Ball, CubeGrid(9, 19), {}, {});
   EXPECT_TRUE(result.touches_border);
   EXPECT_GT(CheckEdges(result.mesh).boundary, 0);
 }
 
-TEST(Polygonize, RefusesAGridThatIsNone) {
+TEST(Polygonize, RefusesAnInvalidGrid) {
   EXPECT_THROW(PolygonizeAll(Ball, SampleGrid{}, {}, {}), InputError);
   EXPECT_THROW(PolygonizeSamples(std::vector<float>(5), CubeGrid(1, 3), {}), InputError);
 }

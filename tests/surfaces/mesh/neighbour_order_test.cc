@@ -7,7 +7,6 @@
 #include <numeric>
 
 #include "tests/testing/shapes.h"
-#include "tests/testing/shuffled.h"
 
 namespace semblance {
 namespace {

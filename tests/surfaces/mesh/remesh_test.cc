@@ -5,7 +5,6 @@
 
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
-#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {

@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 
 #include "tests/testing/shapes.h"
-#include "tests/testing/signed_volume.h"
 
 namespace semblance {
 namespace {
