@@ -52,8 +52,6 @@ Tessellation Tessellate(const HSplineSurface& surface, int per_patch) {
   return result;
 }
 
-namespace {
-
 std::array<DomainCell, 4> Children(const DomainCell& c) {
   return {DomainCell{c.level + 1, 2 * c.i, 2 * c.j}, DomainCell{c.level + 1, 2 * c.i + 1, 2 * c.j},
           DomainCell{c.level + 1, 2 * c.i, 2 * c.j + 1},
