@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "problems/metrics/face_metrics_json.h"
+#include "problems/metrics/face_metrics.h"
 #include "problems/subject/sites.h"
 
 namespace semblance {

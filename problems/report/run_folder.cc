@@ -11,7 +11,7 @@
 #include "fitting/problem/seeding.h"
 #include "fitting/relaxation/dowel_mesh.h"
 #include "problems/bust/bust_files.h"
-#include "problems/metrics/face_metrics_json.h"
+#include "problems/metrics/face_metrics.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/depth_json.h"

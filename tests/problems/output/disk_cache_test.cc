@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "problems/output/manifest.h"
-#include "problems/pipeline/implicit_cache.h"
+#include "problems/pipeline/skull_stage.h"
 #include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
