@@ -9,64 +9,64 @@
 
 #include "problems/bust/pose_bust.h"
 #include "problems/metrics/face_details.h"
-#include "problems/metrics/feature_distortion.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/depth_comparison.h"
 #include "problems/pipeline/skull_stage.h"
 #include "problems/pipeline/uncertainty.h"
-#include "problems/prior/prior_surface.h"
+#include "problems/prior/hspline_prior.h"
 #include "surfaces/hspline_query/tessellate.h"
 
 namespace semblance {
 
-// Of the mesh on which a face is measured, along each side of a patch of its finest level.
+// The mesh on which a face is measured has so many quads along each side of a patch of its finest
+// level.
 inline constexpr int kFaceQuadsPerPatch = 4;
 
-// Against the true skin, where it is known.
+// The comparison with the true skin.
 struct TruthComparison {
   ScoredSkin skin;
   FaceMetrics face;
   FaceDetails details;  // of the face
   FaceMetrics implicit;
   DepthComparison depth;  // of the shell's vertices
-  SigmaCoverage sigma;    // of a fit outside the features' regions; empty without an uncertainty
+  SigmaCoverage sigma;    // empty without uncertainty; for a fit, outside the features' regions
 };
 
 struct RunResult {
   Case subject;
-  TriMesh shell;  // the outer shell of the skull, temples and gaps bridged: what emits
+  TriMesh shell;  // the outer shell of the skull with bridged temples and gaps; it emits
   std::vector<BoneOrigin> origin;  // of the shell's triangles
   DepthField depth;                // of the shell's vertices
   ImplicitFace implicit;
   Similarity face_from_template;
-  TemplateFace placed;  // the generic face brought to the dowels; the prior's most likely face
-                        // where it was asked for
-  std::optional<ShapeEstimate> prior;  // where it was asked for
-  std::vector<AppliedRule> rules;      // that took part in it
+  TemplateFace placed;  // the generic face, brought to the dowels; or the prior's most likely face
+  std::optional<ShapeEstimate> prior;  // if the face uses the prior
+  std::vector<AppliedRule> rules;      // the rules that took part in the estimate
   SeedResult seeding;                  // of the last round
   FitTarget target;                    // of the last round: dowel tips at their (u,v), then seeds
   FitResult fit;                       // of the last round
-  std::optional<HSplineSurface> before_edits;  // fit.surface, before experiment.edits
-  Tessellation face;                           // of fit.surface
-  std::optional<FaceUncertainty> uncertainty;  // where it was asked for
-  std::optional<TruthComparison> truth;
+  std::optional<HSplineSurface>
+      before_edits;   // fit.surface before experiment.edits, if there are any
+  Tessellation face;  // of fit.surface
+  std::optional<FaceUncertainty> uncertainty;
+  std::optional<TruthComparison> truth;  // if the true skin is known
   std::vector<FeatureDistortion> features;
-  std::shared_ptr<const BustModel> bust_model;  // null: no bust was asked for
+  std::shared_ptr<const BustModel> bust_model;  // null: no bust
   std::optional<Bust> bust;                     // of bust_model
-  std::vector<StepTime> times;                  // not part of the result proper
+  std::vector<StepTime> times;  // not reproducible, so kept apart from other results
 
-  // What people should know, a line each: of the subject and its face, then of the implicit face.
+  // Notes for readers, one line each: on the subject and its face, then on the implicit face.
   std::vector<std::string> Notes() const;
-  // Why the face cannot be used; empty if it can.
+  // The reasons why the face cannot be used. Empty if it can.
   std::vector<std::string> Faults() const;
   bool usable() const { return Faults().empty(); }
 };
 
-// Loads the case, fills the skull, interpolates depth, lays the implicit face, places the generic
-// face, makes the subject's face of it as experiment.face says, measures. Throws as LoadSubject
-// does, OutOfMemory, Cancelled, and InputError if the face is not finite. What experiments have in
-// common (the subject, its shell, the implicit face, the generic face) is taken from `cache`, where
-// one is given; the result does not depend on it.
+// Loads the case, fills the skull, interpolates depth, builds the implicit face, places the generic
+// face, makes the subject's face from it in the way of experiment.face, and measures it. Stages
+// that experiments share (the subject, its shell, the implicit face, the generic face) are taken
+// from `cache` if one is given. The result does not depend on it. Throws as LoadSubject does,
+// OutOfMemory, Cancelled, and InputError if the face is not finite.
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache = nullptr);
 
 }  // namespace semblance

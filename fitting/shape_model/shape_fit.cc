@@ -21,7 +21,7 @@
 #include "fitting/shape_model/shape_posterior.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/farthest_first.h"
-#include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/correspondences.h"
 
 namespace semblance {
 namespace {
@@ -212,15 +212,9 @@ class DrawingSurface {
         sd_mm_(target.surface_sd_mm),
         error_mm_(target.surface_error_mm.empty() ? target.surface_sd_mm : target.surface_error_mm),
         otherwise_sd_mm_(options.surface_sd_mm),
-        normals_(VertexNormals(mesh_)),
-        on_border_(mesh_.points.size(), 0),
-        query_(mesh_),
-        reach_mm_(options.surface_reach_mm),
-        least_cosine_(std::cos(options.surface_max_angle_deg * std::numbers::pi / 180)) {
-    for (const MeshEdge& edge : BorderEdges(mesh_)) {
-      on_border_[edge[0]] = on_border_[edge[1]] = 1;
-    }
-  }
+        correspondences_(mesh_, OpenBorder::kReject),
+        match_{.reach_mm = options.surface_reach_mm,
+               .least_cosine = std::cos(options.surface_max_angle_deg * std::numbers::pi / 180)} {}
 
   struct Foot {
     Vec3 position, normal;
@@ -229,18 +223,11 @@ class DrawingSurface {
   };
   // The foot of a point with this normal, if it is within reach and faces the same way.
   std::optional<Foot> FindFoot(const Vec3& p, const Vec3& normal) const {
-    const MeshPoint at = query_.Closest(p);
-    const Triangle& t = mesh_.triangles[at.triangle];
-    if (at.distance_mm > reach_mm_ ||
-        std::ranges::any_of(t, [&](std::int32_t v) { return on_border_[v] != 0; })) {
-      return std::nullopt;
-    }
-    const Vec3 out = (at.weights[0] * normals_[t[0]] + at.weights[1] * normals_[t[1]] +
-                      at.weights[2] * normals_[t[2]])
-                         .normalized();
-    return out.dot(normal) >= least_cosine_
-               ? std::optional(Foot{at.position, out, ValueAt(at, sd_mm_), ValueAt(at, error_mm_)})
-               : std::nullopt;
+    const auto found = correspondences_.Find(p, normal, match_);
+    return found ? std::optional(Foot{found->point.position, found->normal,
+                                      ValueAt(found->point, sd_mm_),
+                                      ValueAt(found->point, error_mm_)})
+                 : std::nullopt;
   }
 
  private:
@@ -256,10 +243,8 @@ class DrawingSurface {
   const TriMesh& mesh_;
   std::span<const double> sd_mm_, error_mm_;  // one per point; empty: otherwise_sd_mm_
   double otherwise_sd_mm_;
-  std::vector<Vec3> normals_;
-  std::vector<char> on_border_;
-  MeshQuery query_;
-  double reach_mm_, least_cosine_;
+  Correspondences correspondences_;
+  CorrespondenceOptions match_;
 };
 
 // ---------------------------------------------------------------------------------------------

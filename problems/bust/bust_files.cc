@@ -20,13 +20,13 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::array<double, 3> kSkinColour = {0.85, 0.65, 0.54};
-constexpr std::array<double, 3> kWhite = {1, 1, 1};  // under colours of points
+constexpr std::array<double, 3> kWhite = {1, 1, 1};  // leaves the colours of points unchanged
 
-// One colour or texture of the bust.
+// A part of the bust with one colour or texture.
 struct Piece {
   std::string name;
   std::array<double, 3> colour = kSkinColour;  // sRGB
-  fs::path texture;                            // empty without
+  fs::path texture;                            // empty: none
   double roughness = 0.6;
   std::vector<Vec3> points, normals;
   std::vector<Vec2> uv;                                   // one per point, or none; v upwards
@@ -34,7 +34,7 @@ struct Piece {
   std::vector<Triangle> triangles;
 };
 
-Piece PieceOf(const EyePart& part) {
+Piece MakePiece(const EyePart& part) {
   return {.name = part.name,
           .colour = part.colour,
           .texture = {},
@@ -45,7 +45,7 @@ Piece PieceOf(const EyePart& part) {
           .triangles = part.mesh.triangles};
 }
 
-std::array<std::uint8_t, 3> BytesOf(const Vec3& colour) {
+std::array<std::uint8_t, 3> ToBytes(const Vec3& colour) {
   std::array<std::uint8_t, 3> bytes{};
   for (int c = 0; c < 3; ++c) {
     bytes[c] = static_cast<std::uint8_t>(std::lround(255 * colour[c]));
@@ -53,7 +53,7 @@ std::array<std::uint8_t, 3> BytesOf(const Vec3& colour) {
   return bytes;
 }
 
-// Of faces whose material no library describes.
+// The colour of faces whose material no library describes.
 std::array<double, 3> PlainColour(const ObjText& obj) {
   return obj.colours.empty() ? kSkinColour : kWhite;
 }
@@ -62,8 +62,8 @@ std::string MaterialName(const std::string& material) {
   return material.empty() ? "skin" : material;
 }
 
-// Of its material. The colours of its points stay beside a plain one; beside a picture, which most
-// often has them too, they would show twice.
+// Gives a piece the looks of its material. The colours of its points stay with a plain material.
+// With a picture, which usually contains them, they would count twice.
 void GiveLooks(const std::string& material, const ObjText& obj, Piece& piece) {
   piece.name = MaterialName(material);
   piece.colour = PlainColour(obj);
@@ -80,7 +80,7 @@ void GiveLooks(const std::string& material, const ObjText& obj, Piece& piece) {
   }
 }
 
-// The faces of an OBJ by material; a point with two texture coordinates becomes two.
+// The faces of an OBJ by material. A point with two texture coordinates becomes two points.
 std::vector<Piece> TexturedPieces(const TriMesh& skin, const ObjText& obj) {
   const std::vector<Vec3> normals = VertexNormals(skin);
   std::map<std::string, Piece> pieces;
@@ -97,7 +97,7 @@ std::vector<Piece> TexturedPieces(const TriMesh& skin, const ObjText& obj) {
         piece.normals.push_back(normals[corner.point]);
         piece.uv.push_back(corner.texture < 0 ? Vec2(0, 0) : obj.texture[corner.texture]);
         if (!obj.colours.empty()) {
-          piece.colours.push_back(BytesOf(obj.colours[corner.point]));
+          piece.colours.push_back(ToBytes(obj.colours[corner.point]));
         }
       }
       corners.push_back(it->second);
@@ -114,11 +114,11 @@ std::vector<Piece> TexturedPieces(const TriMesh& skin, const ObjText& obj) {
   return result;
 }
 
-// Both eyes' parts of a name together.
+// Joins the parts of both eyes that have the same name.
 std::vector<Piece> EyePieces(const std::vector<EyePart>& parts) {
   std::map<std::string, Piece> pieces;
   for (const EyePart& part : parts) {
-    Piece more = PieceOf(part);
+    Piece more = MakePiece(part);
     const auto [at, is_new] = pieces.try_emplace(part.name, more);
     if (is_new) {
       continue;
@@ -138,7 +138,7 @@ std::vector<Piece> EyePieces(const std::vector<EyePart>& parts) {
   return result;
 }
 
-std::vector<Piece> PiecesOf(const Bust& bust, const BustModel& model) {
+std::vector<Piece> MakePieces(const Bust& bust, const BustModel& model) {
   std::vector<Piece> pieces;
   if (model.obj) {
     pieces = TexturedPieces(bust.skin, *model.obj);
@@ -156,7 +156,7 @@ std::vector<Piece> PiecesOf(const Bust& bust, const BustModel& model) {
   return pieces;
 }
 
-GlbPart PartOf(const Piece& piece) {
+GlbPart MakeGlbPart(const Piece& piece) {
   return {.material = {.name = piece.name,
                        .colour = piece.colour,
                        .roughness = piece.roughness,
@@ -170,8 +170,8 @@ GlbPart PartOf(const Piece& piece) {
 
 std::string BustGlb(const Bust& bust, const BustModel& model) {
   GlbNode node{.name = "bust"};
-  for (const Piece& piece : PiecesOf(bust, model)) {
-    node.parts.push_back(PartOf(piece));
+  for (const Piece& piece : MakePieces(bust, model)) {
+    node.parts.push_back(MakeGlbPart(piece));
   }
   return EncodeGlb({&node, 1});
 }
@@ -199,7 +199,7 @@ void AppendMtl(const std::string& name, const std::array<double, 3>& colour, dou
                       colour[2], gloss, gloss, gloss);
 }
 
-// Of an OBJ whose materials nothing describes.
+// Describes the materials of an OBJ without a library.
 void AppendPlainMtl(const ObjText& obj, std::string& mtl) {
   std::set<std::string> names;
   for (const ObjFace& face : obj.faces) {
@@ -211,7 +211,7 @@ void AppendPlainMtl(const ObjText& obj, std::string& mtl) {
 }
 
 std::pair<std::string, std::string> ObjAndMtl(const Bust& bust, const BustModel& model) {
-  std::string mtl = model.obj ? MtlOf(*model.obj) : "";
+  std::string mtl = model.obj ? JoinMtl(*model.obj) : "";
   std::string obj;
   std::size_t points = bust.skin.points.size();
   if (model.obj) {

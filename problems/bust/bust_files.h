@@ -15,11 +15,10 @@ struct NamedBytes {
 };
 
 // bust.glb (binary glTF 2.0: in metres, +y up, the face towards +z), bust.obj with bust.mtl (mm,
-// LPS), and the textures of a bust that has some, in bust_textures/ under names that differ. An OBJ
-// keeps its lines but for the points; without materials of its own the skin is called `skin`.
-// bust.glb has the colours of its points, but where a material has a picture. Single precision.
-// Throws IoError for a texture that can no longer be read, InputError for one that is no PNG or
-// JPEG any more.
+// LPS), and the textures of the bust, in bust_textures/ under different names. An OBJ keeps its
+// lines except for the points. Without materials of its own its skin is called `skin`. bust.glb has
+// the colours of the points, except where a material has a picture. Single precision. Throws
+// IoError if a texture can no longer be read, and InputError if it is no PNG or JPEG any more.
 std::vector<NamedBytes> BustToFiles(const Bust& bust, const BustModel& model);
 
 }  // namespace semblance

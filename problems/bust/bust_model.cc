@@ -8,8 +8,8 @@
 #include <cmath>
 #include <utility>
 
-#include "problems/bust/ict_head.h"
 #include "problems/bust/whole_head.h"
+#include "problems/face_template/ict_face.h"
 #include "problems/face_template/skin_landmarks.h"
 #include "problems/face_template/template_placement.h"
 #include "surfaces/base/atomic_file.h"
@@ -23,9 +23,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kColumns = 272, kRows = 204;  // of the mesh of an H-spline head
+// The mesh of an H-spline head. More columns and rows show finer detail and make larger files.
+constexpr int kColumns = 272, kRows = 204;
 
-std::map<std::string, Vec3> SitesOf(const TemplateFace& face) {
+std::map<std::string, Vec3> SitePoints(const TemplateFace& face) {
   std::map<std::string, Vec3> sites;
   for (const auto& [code, uv] : face.site_uv) {
     sites[code] = face.surface.Point(uv);
@@ -33,14 +34,14 @@ std::map<std::string, Vec3> SitesOf(const TemplateFace& face) {
   return sites;
 }
 
-BustModel OfHead(const WholeHead& head, TemplateFace face, std::string name) {
+BustModel MakeModel(const WholeHead& head, TemplateFace face, std::string name) {
   BustModel bust{.name = std::move(name),
                  .mesh = WholeHeadMesh(head, kColumns, kRows),
                  .eyeballs = head.eyeballs,
                  .rest = std::move(face),
                  .sites = {},
                  .obj = std::nullopt};
-  bust.sites = SitesOf(*bust.rest);
+  bust.sites = SitePoints(*bust.rest);
   return bust;
 }
 
@@ -50,8 +51,8 @@ std::optional<BustModel> Load(const NoBust&, const TemplateSource&, const RunCon
 
 std::optional<BustModel> Load(const IctBust&, const TemplateSource& face_template,
                               const RunContext&) {
-  BustModel bust = OfHead(WholeHeadFromJson(IctHead(), "the ICT head"), LoadTemplate(IctTemplate{}),
-                          "the ICT head");
+  BustModel bust = MakeModel(WholeHeadFromJson(IctHead(), "the ICT head"),
+                             LoadTemplate(IctTemplate{}), "the ICT head");
   if (!std::holds_alternative<IctTemplate>(face_template)) {
     bust.rest.reset();
   }
@@ -67,13 +68,13 @@ std::optional<BustModel> Load(const AutoBust&, const TemplateSource& face_templa
 
 std::optional<BustModel> Load(const HSplineBust& source, const TemplateSource& face_template,
                               const RunContext&) {
-  constexpr double kFarthest_mm = 3;
+  constexpr double kFarthest_mm = 3;  // of the template's sites from the head
   if (source.file.empty()) {
     throw InputError("it names no file; `semblance template --bust` writes one");
   }
   const std::string name = source.file.string();
-  BustModel bust = OfHead(WholeHeadFromJson(ReadFileBytes(source.file), name),
-                          LoadTemplate(face_template), name);
+  BustModel bust = MakeModel(WholeHeadFromJson(ReadFileBytes(source.file), name),
+                             LoadTemplate(face_template), name);
   const MeshQuery query(bust.mesh);
   for (const auto& [code, point] : bust.sites) {
     const double off = query.Closest(point).distance_mm;

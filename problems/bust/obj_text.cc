@@ -50,7 +50,7 @@ std::vector<std::string> Words(const std::string& line) {
   return words;
 }
 
-// What follows the keyword, for names with spaces.
+// The text after the keyword, which may be a name with spaces.
 std::string Rest(const std::string& line) {
   const std::size_t key = line.find_first_not_of(" \t");
   const std::size_t end = line.find_first_of(" \t", key);
@@ -68,7 +68,7 @@ std::optional<double> FiniteNumber(const std::string& word) {
   return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
 }
 
-double NumberOf(const std::string& word, const std::string& name, std::size_t line) {
+double ReadNumber(const std::string& word, const std::string& name, std::size_t line) {
   const std::optional<double> value = FiniteNumber(word);
   if (!value) {
     throw InputError(
@@ -78,7 +78,7 @@ double NumberOf(const std::string& word, const std::string& name, std::size_t li
 }
 
 // `v x y z r g b`, with or without a weight before the colour.
-std::optional<Vec3> ColourOf(const std::vector<std::string>& words) {
+std::optional<Vec3> ReadColour(const std::vector<std::string>& words) {
   if (words.size() < 7) {
     return std::nullopt;
   }
@@ -90,9 +90,9 @@ std::optional<Vec3> ColourOf(const std::vector<std::string>& words) {
   return within ? std::optional(colour) : std::nullopt;
 }
 
-// A file that another one names: only below the folder of both, so that no mesh can have foreign
-// files copied into the results.
-fs::path Beside(const fs::path& folder, std::string name, const std::string& who) {
+// The path of a file that another one names. It must lie below the folder of the other one, so that
+// no mesh can have foreign files copied into the results.
+fs::path PathBelow(const fs::path& folder, std::string name, const std::string& who) {
   std::ranges::replace(name, '\\', '/');
   const fs::path path(name);
   if (path.is_absolute() || std::ranges::find(path, fs::path("..")) != path.end()) {
@@ -114,8 +114,8 @@ bool IsMap(const std::string& word) {
          word == "norm" || word == "refl";
 }
 
-// How many words after an option of a `map_` line belong to it at most; -1: it is no option.
-int ArgumentsOf(const std::string& option) {
+// The largest number of words that belong to an option of a `map_` line; -1 if it is no option.
+int CountArguments(const std::string& option) {
   static const std::map<std::string, int> kArguments = {
       {"-blendu", 1}, {"-blendv", 1},  {"-bm", 1},  {"-boost", 1}, {"-cc", 1},
       {"-clamp", 1},  {"-imfchan", 1}, {"-mm", 2},  {"-o", 3},     {"-s", 3},
@@ -124,10 +124,11 @@ int ArgumentsOf(const std::string& option) {
   return found == kArguments.end() ? -1 : found->second;
 }
 
-// The number of words before the name in `map_Kd -s 2 2 my skin.png`. The name is at least one.
-std::size_t WordsBeforeName(const std::vector<std::string>& words) {
+// The number of words before the name in `map_Kd -s 2 2 my skin.png`. The name has at least one
+// word.
+std::size_t CountWordsBeforeName(const std::vector<std::string>& words) {
   std::size_t k = 1;
-  for (int most; k + 1 < words.size() && (most = ArgumentsOf(words[k])) >= 0;) {
+  for (int most; k + 1 < words.size() && (most = CountArguments(words[k])) >= 0;) {
     ++k;
     for (int n = 0; n < most && k + 1 < words.size(); ++n) {
       if (most == 3 && n > 0 && !FiniteNumber(words[k])) {
@@ -180,20 +181,20 @@ class ObjReader {
  private:
   void Point(const std::vector<std::string>& words) {
     ++points_;
-    if (const std::optional<Vec3> colour = ColourOf(words)) {
+    if (const std::optional<Vec3> colour = ReadColour(words)) {
       obj_.colours.push_back(*colour);
     }
   }
 
   void Texture(const std::vector<std::string>& words, std::size_t line) {
     const auto at = [&](std::size_t k) {
-      return k < words.size() ? NumberOf(words[k], name_, line) : 0.0;
+      return k < words.size() ? ReadNumber(words[k], name_, line) : 0.0;
     };
     obj_.texture.emplace_back(at(1), at(2));
   }
 
   std::int32_t Index(const std::string& word, std::size_t count, std::size_t line) const {
-    const double given = NumberOf(word, name_, line);
+    const double given = ReadNumber(word, name_, line);
     const double index = given < 0 ? static_cast<double>(count) + given : given - 1;
     if (!(index >= 0 && index < static_cast<double>(count))) {
       throw InputError(fmt::format("{}: line {}: index {} is not among the {} before it", name_,
@@ -217,11 +218,11 @@ class ObjReader {
     obj_.faces.push_back(std::move(face));
   }
 
-  // One name with spaces, or several names.
+  // The line has one name with spaces, or several names.
   void Libraries(const std::string& line) {
     const fs::path folder = path_.parent_path();
     const auto is_there = [&](const std::string& name) {
-      return IsFile(Beside(folder, name, name_));
+      return IsFile(PathBelow(folder, name, name_));
     };
     const std::string rest = Rest(line);
     std::vector<std::string> names = Words(rest);
@@ -229,7 +230,7 @@ class ObjReader {
       names = {rest};
     }
     for (const std::string& name : names) {
-      Library(Beside(folder, name, name_));
+      Library(PathBelow(folder, name, name_));
     }
   }
 
@@ -248,23 +249,23 @@ class ObjReader {
       } else if (words.size() >= 4 && words[0] == "Kd") {
         for (int c = 0; c < 3; ++c) {
           obj_.materials[material].colour[c] =
-              std::clamp(NumberOf(words[c + 1], path.string(), 0), 0.0, 1.0);
+              std::clamp(ReadNumber(words[c + 1], path.string(), 0), 0.0, 1.0);
         }
       }
     }
   }
 
-  // The name is what follows the options. Where no such file is there, it is the last word, for
-  // options that are not known here.
+  // The name follows the options. If there is no such file, the last word is taken, because the
+  // line may have options that are not known here.
   void Map(const std::string& given, const fs::path& library, const std::string& material) {
     const std::string line = WithoutComment(given);
     const std::vector<std::string> words = Words(line);
     std::string name = line;
-    for (std::size_t k = WordsBeforeName(words); k > 0; --k) {
+    for (std::size_t k = CountWordsBeforeName(words); k > 0; --k) {
       name = Rest(name);
     }
     const auto file_of = [&](const std::string& file) {
-      return Beside(library.parent_path(), file, library.string());
+      return PathBelow(library.parent_path(), file, library.string());
     };
     if (!IsFile(file_of(name)) && IsFile(file_of(words.back()))) {
       name = words.back();
@@ -281,7 +282,7 @@ class ObjReader {
     obj_.mtl.push_back({line.substr(0, line.size() - name.size()), TextureNumber(file)});
   }
 
-  // The GLB takes no other.
+  // A GLB can hold no other pictures.
   static void CheckPicture(const fs::path& file, const fs::path& library) {
     if (!IsGlbPicture(ReadFileBytes(file))) {
       throw InputError(
@@ -300,8 +301,8 @@ class ObjReader {
     return number;
   }
 
-  // Without spaces, at which other programs would cut it; and unlike the others where case does not
-  // count too.
+  // The name has no spaces, because other programs would cut it there. It differs from the others
+  // even where case does not count.
   std::string TextureName(const fs::path& file) const {
     std::string stem = file.stem().string(), ending = file.extension().string();
     std::ranges::replace(stem, ' ', '_');
@@ -379,7 +380,7 @@ std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
   return text;
 }
 
-std::string MtlOf(const ObjText& obj) {
+std::string JoinMtl(const ObjText& obj) {
   std::string text;
   for (const MtlLine& line : obj.mtl) {
     text += line.text + (line.texture ? obj.textures[*line.texture].name : "") + '\n';

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An OBJ file with all that it says of looks, so that it can be written again with other points.
+// An OBJ file with its materials and textures, so that it can be written again with other points.
 #pragma once
 
 #include <cstdint>
@@ -16,12 +16,12 @@ namespace semblance {
 
 struct ObjMaterial {
   Vec3 colour = Vec3::Constant(0.8);  // Kd, 0..1
-  std::filesystem::path texture;      // map_Kd; empty without
+  std::filesystem::path texture;      // map_Kd; empty: none
 };
 
 struct ObjCorner {
   std::int32_t point = -1;
-  std::int32_t texture = -1;  // -1 without
+  std::int32_t texture = -1;  // -1: none
 };
 
 struct ObjFace {
@@ -32,7 +32,7 @@ struct ObjFace {
 // A picture that a material names.
 struct ObjTexture {
   std::filesystem::path file;
-  std::string name;  // in the folder of a run: bust_textures/ and a name of its own
+  std::string name;  // in the folder of a run: bust_textures/ and a unique name
 };
 
 struct MtlLine {
@@ -41,7 +41,7 @@ struct MtlLine {
 };
 
 struct ObjText {
-  std::vector<std::string> lines;  // continued ones joined
+  std::vector<std::string> lines;  // continued lines are joined
   std::vector<Vec2> texture;       // as written: v upwards
   std::vector<Vec3> colours;       // sRGB, 0..1, one per point; empty unless all points have one
   std::vector<ObjFace> faces;
@@ -50,22 +50,22 @@ struct ObjText {
   std::vector<ObjTexture> textures;  // each file once
 };
 
-// A file that ReadMesh has taken. A name that `mtllib` or a `map_` gives may have spaces. Throws
-// IoError for a material library or texture that cannot be read, InputError for one outside the
-// folder of the OBJ, a `map_Kd` that is neither PNG nor JPEG, or a texture coordinate that is not
-// there.
+// Reads a file that ReadMesh has accepted. Names after `mtllib` or `map_` may contain spaces.
+// Throws IoError for a material library or texture that cannot be read. Throws InputError for one
+// outside the folder of the OBJ, for a `map_Kd` that is neither PNG nor JPEG, and for a missing
+// texture coordinate.
 ObjText ReadObjText(const std::filesystem::path& path);
 
 struct ObjLooks {
-  std::string library;         // what `mtllib` names
-  std::string first_material;  // of faces before the first `usemtl`; empty: they stay without
+  std::string library;         // the name after `mtllib`
+  std::string first_material;  // of faces before the first `usemtl`; empty: none
 };
 
 // The same lines with these points, without normals. points: as many as the file has.
 std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
                           const ObjLooks& looks);
 
-// The material libraries as one, with the textures' names in the folder of a run.
-std::string MtlOf(const ObjText& obj);
+// The material libraries joined into one, with the textures' names in the folder of a run.
+std::string JoinMtl(const ObjText& obj);
 
 }  // namespace semblance

@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <span>
 #include <utility>
@@ -17,34 +18,35 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/tessellate.h"
-#include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/correspondences.h"
 #include "surfaces/mesh/outer_surface.h"
 
 namespace semblance {
 namespace {
 
 constexpr int kQuadsPerPatch = 4;
-constexpr double kOnFace_mm = 1;   // what at rest lies so near to the template is of the face
-constexpr double kSameSide = 0.6;  // cosine between normals
-constexpr double kLids = 1.45;     // radii of the eyeball, round its centre
-constexpr double kLidTrust = 0.05;
-constexpr double kSkullTrust = 0.1;  // of the scalp, against 1 of the face
-constexpr double kScalpReach_mm = 20;
-constexpr double kEar_mm = 45;  // round the ear
-constexpr int kRounds = 2;
+constexpr double kOnFace_mm = 1;       // vertices at rest within this of the template follow it
+constexpr double kLeastCosine = 0.6;   // between normals; a smaller one lets walls follow as well
+constexpr double kLids = 1.45;         // lids reach to so many radii from the eyeball's centre
+constexpr double kLidTrust = 0.05;     // of the lids, so that they keep much of their shape
+constexpr double kSkullTrust = 0.1;    // of the scalp, against 1 of the face
+constexpr double kScalpReach_mm = 20;  // scalp farther from the skull's tissue does not follow it
+constexpr double kEar_mm = 45;         // radius of the ears, which do not follow the skull
+constexpr double kLeastTrust = 1e-3;   // vertices with less follow nothing
+constexpr int kRounds = 2;  // the second round finds better matches, within half the reach
 
-// How far a face is to be followed: not at its border, where nothing holds it.
-double TrustAt(const Vec2& uv) {
+// The weight with which a bust follows the face: 0 at the border, where no data hold the face.
+double FaceTrust(const Vec2& uv) {
   const double side = SmoothStep(std::min(uv.x(), 1 - uv.x()) / 0.08);
   return side * SmoothStep((uv.y() - 0.02) / 0.09) * SmoothStep((1 - uv.y()) / 0.09);
 }
 
-// A vertex of the bust and what of the face it follows.
+// A vertex of the bust and the point of the face that it follows.
 struct OnFace {
   std::int32_t vertex = -1;
   int triangle = -1;
   Vec3 weights = Vec3::Constant(kNaN);
-  Vec3 beside = Vec3::Zero();  // from the face to the vertex, in the frame of both
+  Vec3 beside = Vec3::Zero();  // from the face to the vertex, at rest
   Vec3 normal = Vec3::Zero();  // of the face there
   double trust = 0;
 };
@@ -55,6 +57,7 @@ class FaceMesh {
       : tessellation_(Tessellate(surface, kQuadsPerPatch)) {}
 
   const TriMesh& mesh() const { return tessellation_.mesh; }
+  const std::vector<Vec3>& normals() const { return tessellation_.normals; }
   template <class Value>
   Value At(const std::vector<Value>& values, int triangle, const Vec3& weights) const {
     const Triangle& t = mesh().triangles[triangle];
@@ -74,20 +77,21 @@ class FaceMesh {
   Tessellation tessellation_;
 };
 
-// The vertices of `mesh` that lie on the face, or within reach of it.
+// The vertices of `mesh` that correspond to a point of the face within reach_mm.
 std::vector<OnFace> FindOnFace(const TriMesh& mesh, const FaceMesh& face, double reach_mm,
                                std::span<const Sphere> eyes, int threads) {
-  const MeshQuery query(face.mesh());
+  const Correspondences on_face(face.mesh(), face.normals());
+  const CorrespondenceOptions match{.reach_mm = reach_mm, .least_cosine = kLeastCosine};
   const std::vector<Vec3> normals = VertexNormals(mesh);
   std::vector<OnFace> found(mesh.points.size());
   ParallelFor(mesh.points.size(), threads, 256, [&](std::size_t v) {
     const Vec3& p = mesh.points[v];
-    const MeshPoint at = query.Closest(p);
-    const Vec3 normal = face.Normal(at.triangle, at.weights);
-    if (at.distance_mm > reach_mm || normal.dot(normals[v]) < kSameSide) {
+    const auto correspondence = on_face.Find(p, normals[v], match);
+    if (!correspondence) {
       return;
     }
-    double trust = TrustAt(face.Uv(at.triangle, at.weights));
+    const MeshPoint& at = correspondence->point;
+    double trust = FaceTrust(face.Uv(at.triangle, at.weights));
     for (const Sphere& eye : eyes) {
       const double lids = (p - eye.center).norm() / eye.radius_mm;
       trust *= kLidTrust + (1 - kLidTrust) * SmoothStep((lids - kLids) / 0.5);
@@ -96,15 +100,15 @@ std::vector<OnFace> FindOnFace(const TriMesh& mesh, const FaceMesh& face, double
                 .triangle = at.triangle,
                 .weights = at.weights,
                 .beside = p - at.position,
-                .normal = normal,
+                .normal = correspondence->normal,
                 .trust = trust};
   });
-  std::erase_if(found, [](const OnFace& f) { return f.vertex < 0 || f.trust < 1e-3; });
+  std::erase_if(found, [](const OnFace& f) { return f.vertex < 0 || f.trust < kLeastTrust; });
   return found;
 }
 
-// The part of the head over the brain case, in the subject's frame: above the ears and the lower
-// border of the orbits, and not the ears.
+// The part of the head over the brain case, in the subject's frame. It lies above the ears and the
+// lower border of the orbits, and excludes the ears.
 class Scalp {
  public:
   Scalp(const HSplineSurface& face, const std::map<std::string, Vec2>& site_uv) {
@@ -115,14 +119,16 @@ class Scalp {
     up_ = (left - right).cross(back).normalized();
     middle_ = middle;
     for (const Vec3& side : {left, right}) {
-      ears_.push_back({side + 14 * back - 12 * up_, kEar_mm});
+      ears_.push_back({side + 14 * back - 12 * up_, kEar_mm});  // behind and below sgl
     }
   }
   bool InEar(const Vec3& p) const {
     return std::ranges::any_of(ears_, [&](const Sphere& ear) { return ear.Contains(p); });
   }
-  // 0 to 1: how much of the scalp a point is.
+  // 1 on the scalp, 0 off it, smooth between.
   double At(const Vec3& p) const {
+    // One factor rises from 0 at 25 mm over the ears to 1 at 45 mm higher. The others rise from 0 at
+    // the ears to 1 at 20 mm outside them.
     constexpr double kFirst_mm = 25, kWidth_mm = 45, kBeside_mm = 20;
     double part = SmoothStep((up_.dot(p - middle_) - kFirst_mm) / kWidth_mm);
     for (const Sphere& ear : ears_) {
@@ -135,6 +141,76 @@ class Scalp {
   Vec3 up_, middle_;
   std::vector<Sphere> ears_;
 };
+
+// ---------------------------------------------------------------------------------------------
+// Eyes by formula
+// ---------------------------------------------------------------------------------------------
+
+constexpr int kRingPoints = 64;
+// Radii. That of the limbus, the border of the iris, is from Ruefer et al. (2005). They do not
+// depend on the size of the ball.
+constexpr double kPupil_mm = 1.9, kIris_mm = 5.4, kLimbus_mm = 5.9;
+constexpr double kCornea_mm = 0.5;                // height of the cornea over the sphere
+constexpr double kBack = 0.6 * std::numbers::pi;  // angle from the gaze at which the shell ends
+
+// A sphere with a slightly steeper cornea in the direction of the gaze.
+class EyeShell {
+ public:
+  EyeShell(const Sphere& ball, const Vec3& gaze, const Vec3& up) : ball_(ball), gaze_(gaze) {
+    right_ = gaze.cross(up).normalized();
+    up_ = right_.cross(gaze);
+  }
+
+  // The shell between two angles from the gaze.
+  TriMesh Ring(double from, double to, int steps) const {
+    TriMesh mesh;
+    for (int s = 0; s <= steps; ++s) {
+      for (int k = 0; k < kRingPoints; ++k) {
+        mesh.points.push_back(
+            At(from + (to - from) * s / steps, 2 * std::numbers::pi * k / kRingPoints));
+      }
+    }
+    for (int s = 0; s < steps; ++s) {
+      for (int k = 0; k < kRingPoints; ++k) {
+        const int a = s * kRingPoints + k, b = s * kRingPoints + (k + 1) % kRingPoints;
+        if (from > 0 || s > 0) {
+          mesh.triangles.push_back({a, b, a + kRingPoints});
+        }
+        mesh.triangles.push_back({b, b + kRingPoints, a + kRingPoints});
+      }
+    }
+    return mesh;
+  }
+
+ private:
+  Vec3 At(double angle, double round) const {
+    const double end = 1.15 * std::asin(std::min(kLimbus_mm / ball_.radius_mm, 0.8));
+    const double t = std::max(0.0, 1 - angle * angle / (end * end));
+    const double radius = ball_.radius_mm + kCornea_mm * t * t;
+    const Vec3 side = std::cos(round) * right_ + std::sin(round) * up_;
+    return ball_.center + radius * (std::cos(angle) * gaze_ + std::sin(angle) * side);
+  }
+
+  Sphere ball_;
+  Vec3 gaze_, right_, up_;
+};
+
+// The front of the eye. gaze: unit, the direction of view; up: not parallel to it.
+std::vector<EyePart> EyeParts(const Sphere& ball, const Vec3& gaze, const Vec3& up) {
+  const EyeShell shell(ball, gaze, up);
+  const auto angle = [&](double radius_mm) {
+    return std::asin(std::min(radius_mm / ball.radius_mm, 0.9));
+  };
+  const double pupil = angle(kPupil_mm), iris = angle(kIris_mm), limbus = angle(kLimbus_mm);
+  return {{"sclera", {0.93, 0.91, 0.89}, shell.Ring(limbus, kBack, 16)},
+          {"limbus", {0.20, 0.19, 0.19}, shell.Ring(iris, limbus, 2)},
+          {"iris", {0.39, 0.36, 0.31}, shell.Ring(pupil, iris, 6)},
+          {"pupil", {0.03, 0.03, 0.03}, shell.Ring(0, pupil, 3)}};
+}
+
+// ---------------------------------------------------------------------------------------------
+// The pose
+// ---------------------------------------------------------------------------------------------
 
 class BustPoser {
  public:
@@ -153,7 +229,7 @@ class BustPoser {
       Follow(round);
     }
     Release();
-    return Result();
+    return MakeResult();
   }
 
  private:
@@ -188,7 +264,7 @@ class BustPoser {
     }
   }
 
-  // Walls of nostrils and ears are not the face's.
+  // Finds the vertices seen from outside. The walls of nostrils and ears do not follow the face.
   void FindOuter() {
     outer_.assign(placed_.points.size(), true);
     const std::vector<bool> seen = SeenFromOutside(placed_, context_.threads);
@@ -231,21 +307,19 @@ class BustPoser {
       return;
     }
     const Scalp scalp(in_.face, in_.site_uv);
-    const std::vector<Vec3> normals = VertexNormals(posed_), skull = VertexNormals(in_.over_skull);
+    constexpr CorrespondenceOptions kMatch = {.reach_mm = kScalpReach_mm,
+                                              .least_cosine = kLeastCosine};
+    const std::vector<Vec3> normals = VertexNormals(posed_);
     std::vector<SoftTarget> found(posed_.points.size());
     ParallelFor(found.size(), context_.threads, 256, [&](std::size_t v) {
       const Vec3& p = posed_.points[v];
       const double part = scalp.At(p);
-      if (part < 1e-3) {
+      if (part < kLeastTrust) {
         return;
       }
-      const MeshPoint at = over_skull_->Closest(p);
-      const Triangle& t = in_.over_skull.triangles[at.triangle];
-      const Vec3 normal =
-          (skull[t[0]] * at.weights[0] + skull[t[1]] * at.weights[1] + skull[t[2]] * at.weights[2])
-              .normalized();
-      if (at.distance_mm < kScalpReach_mm && normal.dot(normals[v]) > kSameSide) {
-        found[v] = {static_cast<std::int32_t>(v), p + normal * normal.dot(at.position - p),
+      if (const auto at = over_skull_->Find(p, normals[v], kMatch)) {
+        const Vec3& normal = at->normal;
+        found[v] = {static_cast<std::int32_t>(v), p + normal * normal.dot(at->point.position - p),
                     kSkullTrust * part};
       }
     });
@@ -253,14 +327,14 @@ class BustPoser {
       found[f.vertex].weight *= std::max(1 - f.trust, 0.0);
     }
     for (const SoftTarget& target : found) {
-      if (target.vertex >= 0 && target.weight > 1e-3 * kSkullTrust) {
+      if (target.vertex >= 0 && target.weight > kLeastTrust * kSkullTrust) {
         scalp_.push_back(target);
       }
     }
   }
 
-  // What lay beside the face turns with it.
-  Vec3 TargetOf(const OnFace& f) const {
+  // The vertex's offset from the face turns with the face.
+  Vec3 FindTarget(const OnFace& f) const {
     const Vec3 normal = face_.Normal(f.triangle, f.weights);
     const auto turn =
         Eigen::Quaterniond::FromTwoVectors(subject_from_model_.rotation * f.normal, normal);
@@ -272,7 +346,7 @@ class BustPoser {
     std::vector<SoftTarget> targets;
     for (const OnFace& f : on_face_) {
       if (!released_[f.vertex]) {
-        targets.push_back({f.vertex, TargetOf(f), f.trust});
+        targets.push_back({f.vertex, FindTarget(f), f.trust});
       }
     }
     for (const SoftTarget& target : scalp_) {
@@ -283,10 +357,11 @@ class BustPoser {
     posed_.points = deformation_->Follow(targets);
   }
 
-  // Lets go of what turns a triangle over, a little further round each time.
+  // Releases the vertices of triangles that turn over, with two rings around them. Repeats this
+  // with the new result, so that the released parts grow until no triangle turns over.
   void Release() {
-    constexpr int kMost = 6;
-    for (int time = 0; time < kMost; ++time) {
+    constexpr int kAttempts = 6;  // Bust::turned_over reports what then is left
+    for (int attempt = 0; attempt < kAttempts; ++attempt) {
       const std::vector<std::int32_t> turned = TurnedOver(placed_, posed_, Mat3::Identity());
       if (turned.empty()) {
         return;
@@ -315,7 +390,7 @@ class BustPoser {
     }
   }
 
-  // The eye goes with its lids, which touch it.
+  // An eye moves with its lids, which touch it.
   void PoseEyes(Bust& bust) const {
     for (const Sphere& eye : in_.model.eyeballs) {
       std::vector<Vec3> from, to;
@@ -335,11 +410,11 @@ class BustPoser {
     }
   }
 
-  Bust Result() const {
+  Bust MakeResult() const {
     Bust bust{.skin = posed_, .eyes = {}, .subject_from_model = subject_from_model_};
     double sum = 0, weight = 0;
     for (const OnFace& f : on_face_) {
-      sum += f.trust * (posed_.points[f.vertex] - TargetOf(f)).squaredNorm();
+      sum += f.trust * (posed_.points[f.vertex] - FindTarget(f)).squaredNorm();
       weight += f.trust;
     }
     bust.on_face = static_cast<int>(on_face_.size());
@@ -361,8 +436,8 @@ class BustPoser {
   const RunContext& context_;
   const FaceMesh face_;
   std::optional<SoftDeformation> deformation_;  // of placed_
-  std::optional<MeshQuery> over_skull_;
-  std::vector<bool> outer_;  // of a model without a rest
+  std::optional<Correspondences> over_skull_;
+  std::vector<bool> outer_;  // one per vertex; of a model without `rest`
   std::vector<bool> released_;
   std::vector<OnFace> on_face_;
   std::vector<SoftTarget> scalp_;

@@ -17,7 +17,7 @@ SoftDeformation::SoftDeformation(const TriMesh& mesh, const DeformOptions& optio
   const Eigen::SparseMatrix<double> per_area = area_mm2_.cwiseInverse().asDiagonal() * k;
   bending_ = k * per_area;
   bending_ *= stiffness;
-  bending_ += k * (stiffness / (options.calm_mm * options.calm_mm));
+  bending_ += k * (stiffness / (options.level_out_mm * options.level_out_mm));
   bending_.diagonal() += area_mm2_ * (stiffness / std::pow(options.fade_mm, 4));
 }
 

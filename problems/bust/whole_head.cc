@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,8 +15,7 @@
 
 #include "fitting/fit.h"
 #include "fitting/problem/start_surface.h"
-#include "problems/bust/eyeball.h"
-#include "problems/bust/head_samples.h"
+#include "problems/bust/head_domain.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/hspline_json.h"
@@ -27,10 +27,10 @@ using json_parts::Json;
 
 constexpr HSplineShape kShape = {
     .patches_u = 16, .patches_v = 12, .max_level = 4, .closure = Closure::kPeriodicU};
-constexpr int kSamplesPerPatch = 2;  // of the finest level, along each side
-constexpr double kTolerance_mm = 0.12;
-constexpr double kWave_mm = 1;  // of the displacement, that smoothness halves
-constexpr double kUnit_mm = 1e-3;
+constexpr int kSamplesPerPatch = 2;     // of the finest level, along each side
+constexpr double kTolerance_mm = 0.12;  // patches that are farther off are refined
+constexpr double kWave_mm = 1;          // smoothness halves displacements of this wavelength
+constexpr double kUnit_mm = 1e-3;       // of the written numbers
 
 FitOptions HeadFitOptions() {
   constexpr double kLength_mm = 10;
@@ -49,7 +49,7 @@ Vec3 Rounded(const Vec3& v) {
           std::round(v.z() / kUnit_mm) * kUnit_mm};
 }
 
-// What is written with fewer digits.
+// Rounds to three decimals, so that the written text is short.
 Vec3 Shortened(const Vec3& v) {
   const auto number = [](double x) { return std::stod(fmt::format("{:.3f}", x)) + 0.0; };
   return {number(v.x()), number(v.y()), number(v.z())};
@@ -71,10 +71,28 @@ HSplineSurface Shortened(const HSplineSurface& surface) {
   return result;
 }
 
-// The openings of the eyes: off the midline, and as wide as an eye.
+// The least-squares sphere through points. Needs four that do not lie on a circle.
+Sphere FitSphere(std::span<const Vec3> points) {
+  const auto n = static_cast<Eigen::Index>(points.size());
+  Vec3 middle = Vec3::Zero();
+  for (const Vec3& p : points) {
+    middle += p / static_cast<double>(n);
+  }
+  Eigen::MatrixXd left(n, 4);
+  Eigen::VectorXd right(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const Vec3 p = points[i] - middle;
+    left.row(i) << 2 * p.transpose(), 1;
+    right[i] = p.squaredNorm();
+  }
+  const Eigen::Vector4d x = left.colPivHouseholderQr().solve(right);
+  return {middle + x.head<3>(), std::sqrt(x[3] + x.head<3>().squaredNorm())};
+}
+
+// The balls behind openings that lie off the midline and are as wide as an eye.
 std::vector<Sphere> Eyeballs(const HeadDomain& domain) {
-  constexpr double kNarrowest_mm = 15, kWidest_mm = 40, kOffMidline_mm = 15;
-  constexpr double kBehindLid_mm = 0.1;
+  constexpr double kNarrowest_mm = 15, kWidest_mm = 40, kOffMidline_mm = 15;  // of an eye's opening
+  constexpr double kBehindLid_mm = 0.1;  // gap between the ball and the lids
   const double midline = Bounds(domain.mesh).center().x();
   std::vector<Sphere> eyes;
   for (const auto& rim : domain.rims) {
@@ -86,7 +104,7 @@ std::vector<Sphere> Eyeballs(const HeadDomain& domain) {
     }
     const double width = box.sizes().x(), aside = std::abs(box.center().x() - midline);
     if (width > kNarrowest_mm && width < kWidest_mm && aside > kOffMidline_mm) {
-      Sphere ball = SphereThrough(points);
+      Sphere ball = FitSphere(points);
       ball.radius_mm -= kBehindLid_mm;
       eyes.push_back({Shortened(ball.center), Shortened(Vec3::Constant(ball.radius_mm)).x()});
     }
@@ -95,9 +113,11 @@ std::vector<Sphere> Eyeballs(const HeadDomain& domain) {
   return eyes;
 }
 
-// Half as many as the ring below where they would be crowded, so that no slivers meet at the crown.
-int ColumnsAt(const WholeHead& head, int row, int below, int rows) {
-  constexpr int kFewest = 8, kProbes = 32;
+// The number of points of a ring: half of the ring below if they would be crowded, else the same.
+// So no slivers meet at the crown.
+int CountColumns(const WholeHead& head, int row, int below, int rows) {
+  constexpr int kFewestColumns = 8;  // of the last rings
+  constexpr int kProbes = 32;        // edges over which the lengths are measured
   const double v = static_cast<double>(row) / rows;
   double round = 0, up = 0;
   for (int i = 0; i < kProbes; ++i) {
@@ -105,11 +125,12 @@ int ColumnsAt(const WholeHead& head, int row, int below, int rows) {
     round += (head.surface.Point({double(i + 1) / kProbes, v}) - p).norm();
     up += (head.surface.Point({double(i) / kProbes, v - 1.0 / rows}) - p).norm() / kProbes;
   }
-  return row > rows / 2 && below % 2 == 0 && below > kFewest && round / below < 0.5 * up ? below / 2
-                                                                                         : below;
+  return row > rows / 2 && below % 2 == 0 && below > kFewestColumns && round / below < 0.5 * up
+             ? below / 2
+             : below;
 }
 
-std::vector<Vec3> RingAt(const WholeHead& head, double v, int columns) {
+std::vector<Vec3> MakeRing(const WholeHead& head, double v, int columns) {
   std::vector<Vec3> ring;
   for (int i = 0; i < columns; ++i) {
     ring.push_back(head.surface.Point({double(i) / columns, v}));
@@ -117,10 +138,11 @@ std::vector<Vec3> RingAt(const WholeHead& head, double v, int columns) {
   return ring;
 }
 
-// As close to the crown, where all u meet: besides wide gaps there are points that all but
-// coincide, and the triangles between them would fold over.
+// Close to the crown, where all u meet, some points of a ring nearly coincide while others are far
+// apart. The triangles between such points would fold over.
 bool IsCrowded(const std::vector<Vec3>& ring) {
-  constexpr double kLongest_mm = 60, kLeastOfMean = 0.3;
+  constexpr double kLongest_mm = 60;    // longer rings are not close to the crown
+  constexpr double kLeastOfMean = 0.3;  // shortest edge of a sound ring, as a part of the mean edge
   double round = 0, shortest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < ring.size(); ++i) {
     const double edge = (ring[(i + 1) % ring.size()] - ring[i]).norm();
@@ -130,7 +152,7 @@ bool IsCrowded(const std::vector<Vec3>& ring) {
   return round < kLongest_mm && shortest < kLeastOfMean * round / static_cast<double>(ring.size());
 }
 
-// Between rings of as many points, or of half as many in the upper one.
+// Joins two rings by triangles. The upper one has as many points as the lower one, or half as many.
 void JoinRings(int lower, int n, int upper, int m, TriMesh& mesh) {
   for (int i = 0; i < m; ++i) {
     const int next = (i + 1) % m;
@@ -211,8 +233,8 @@ TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows) {
   TriMesh mesh;
   std::vector<int> first, count;  // of each ring
   for (int j = 0; j < rows; ++j) {
-    const int around = ColumnsAt(head, j, j == 0 ? columns : count.back(), rows);
-    const std::vector<Vec3> ring = RingAt(head, double(j) / rows, around);
+    const int around = CountColumns(head, j, j == 0 ? columns : count.back(), rows);
+    const std::vector<Vec3> ring = MakeRing(head, double(j) / rows, around);
     if (j > rows / 2 && IsCrowded(ring)) {
       break;
     }

@@ -12,32 +12,33 @@
 
 namespace semblance {
 
-// mm, LPS. The surface goes round in u, from the back over the face (0.5); at v = 1, the crown, all
-// u meet; at v = 0 the neck ends. Behind the lids and the lips it turns inwards.
+// In mm, LPS. u goes round the head, from the back (0) over the face (0.5). v goes from the end of
+// the neck (0) to the crown (1), where all u meet. Behind the lids and the lips the surface turns
+// inwards.
 struct WholeHead {
   HSplineSurface surface;
-  std::vector<Sphere> eyeballs;  // the subject's right one first; none where the eyes are closed
+  std::vector<Sphere> eyeballs;  // the subject's right one first; none if the eyes are closed
 };
 
 struct WholeHeadFit {
   WholeHead head;
-  double rms_mm = kNaN, max_mm = kNaN;  // of the mesh's samples
+  double rms_mm = kNaN, max_mm = kNaN;  // distance of the mesh's samples from the surface
   bool usable = false;
 };
 
-// The H-spline of a head's mesh (head_domain.h), finer where it is more than 0.12 mm off. Offsets
-// and vertices are rounded to 1 um. An opening between the middle and the top of the face, about as
-// wide as an eye, is one. Throws InputError as LayOutHead, Cancelled.
+// Fits the H-spline of a head to its mesh (head_domain.h). Patches that are more than 0.12 mm off
+// are refined. Offsets and vertices are rounded to 1 um. A closed opening off the midline that is
+// about as wide as an eye counts as an eye. Throws InputError as LayOutHead does, and Cancelled.
 WholeHeadFit FitWholeHead(const TriMesh& mesh, const std::string& name, const RunContext& context);
 
 // {"format": "semblance-head", "version": 1, "eyeballs": [[x, y, z, radius], ...], "surface": the
-// H-spline as in hspline_json.h}. name: what errors call the text. WholeHeadFromJson throws
-// IoError, which begins with it, for anything else.
+// H-spline as in hspline_json.h}. name: messages begin with it. WholeHeadFromJson throws IoError
+// for anything else.
 std::string WholeHeadToJson(const WholeHead& head);
 WholeHead WholeHeadFromJson(std::string_view text, const std::string& name);
 
-// The head as triangles, `columns` round and `rows` high, closed at the crown. Near it rings have
-// fewer points, and a fan takes the place of the last ones, whose points crowd together.
+// The head as triangles, `columns` round and `rows` high, closed at the crown. Rings near the crown
+// have fewer points. A fan replaces the last rings, whose points would crowd together.
 TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows);
 
 }  // namespace semblance

@@ -17,10 +17,6 @@ std::optional<Vec3> ToVec3(const std::optional<std::array<double, 3>>& v) {
   return v ? std::optional(Vec3((*v)[0], (*v)[1], (*v)[2])) : std::nullopt;
 }
 
-std::optional<std::array<double, 3>> ToArray(const std::optional<Vec3>& v) {
-  return v ? std::optional(std::array{v->x(), v->y(), v->z()}) : std::nullopt;
-}
-
 bool Holds(const std::array<double, 2>& range, double x) {
   return range[0] <= range[1] ? x >= range[0] && x <= range[1] : x >= range[0] || x <= range[1];
 }
@@ -37,7 +33,7 @@ void AddResets(const std::vector<RegionReset>& resets, const HSplineSurface& sur
   }
 }
 
-// The edits by vertex, those of level 0 too.
+// The edits by vertex, including those of level 0.
 Changes EditsByVertex(const std::vector<VertexEdit>& edits) {
   Changes changes;
   for (const VertexEdit& edit : edits) {
@@ -50,7 +46,7 @@ Changes EditsByVertex(const std::vector<VertexEdit>& edits) {
   return changes;
 }
 
-// Moves vertices of level 0 in `net`; what takes it back goes into `inverse`.
+// Moves a vertex of level 0 in `net`, and adds the opposite move to `inverse`.
 void MoveVertex(const VertexId& vertex, const std::optional<Vec3>& offset, ControlNet& net,
                 EditScript& inverse) {
   if (vertex.i < 0 || vertex.i >= net.columns || vertex.j < 0 || vertex.j >= net.rows) {
@@ -65,10 +61,15 @@ void MoveVertex(const VertexId& vertex, const std::optional<Vec3>& offset, Contr
         vertex.i, vertex.j));
   }
   net.At(vertex.i, vertex.j) += *offset;
-  inverse.edits.push_back({0, vertex.i, vertex.j, ToArray(Vec3(-*offset))});
+  inverse.edits.push_back(MakeEdit(vertex, Vec3(-*offset)));
 }
 
 }  // namespace
+
+VertexEdit MakeEdit(const VertexId& vertex, const std::optional<Vec3>& offset) {
+  return {vertex.level, vertex.i, vertex.j,
+          offset ? std::optional(std::array{offset->x(), offset->y(), offset->z()}) : std::nullopt};
+}
 
 EditScript ReadEditScript(const std::filesystem::path& path) {
   EditScript script = ReadConfig<EditScript>(path);
@@ -98,7 +99,7 @@ EditScript ApplyEdits(const EditScript& script, HSplineSurface& surface) {
   }
   next.SetOffsets(changes);
   for (const auto& [vertex, offset] : changes) {
-    inverse.edits.push_back({vertex.level, vertex.i, vertex.j, ToArray(surface.Offset(vertex))});
+    inverse.edits.push_back(MakeEdit(vertex, surface.Offset(vertex)));
   }
   surface = std::move(next);
   return inverse;

@@ -12,6 +12,7 @@
 namespace semblance {
 namespace {
 
+// In patches. A smaller reach may move no vertex; a larger one moves most of a face.
 constexpr double kLeastReach = 1, kMostReach = 8;
 
 void Check(const Pull& pull, const HSplineSurface& face) {
@@ -28,14 +29,13 @@ void Check(const Pull& pull, const HSplineSurface& face) {
   }
 }
 
-// The shorter way round, of two places in 0..1.
+// The distance of two places in 0..1, the shorter way round if the domain is closed.
 double Apart(double a, double b, bool closed) {
   const double straight = std::abs(a - b);
   return closed ? std::min(straight, 1 - straight) : straight;
 }
 
-// How much each vertex of the level goes along with the point at uv, [index]; the surface there
-// moves by 1 if each vertex moves by its share.
+// The share of each vertex of the level in the move of the point at uv, before scaling.
 std::vector<double> SharesAround(const HSplineShape& shape, int level, const Vec2& uv,
                                  double reach) {
   std::vector<double> shares(static_cast<std::size_t>(shape.Columns(level)) * shape.Rows(level));
@@ -68,11 +68,14 @@ void MoveBy(const std::vector<double>& shares, const Vec3& by, ControlNet& net) 
   }
 }
 
-// Both sides move alike: with m the movement of a point by its own vertices and o by those of the
-// other side, along the plane (m + o) d = by, across it (m - o) d = by.
+// Moves both sides by mirrored displacements d. Let m be the movement of a point by the vertices
+// around it and o that by the vertices around its mirror image. In the mirror plane both add up: (m
+// + o) d = by. Across the plane they oppose each other: (m - o) d = by.
 void MoveBothSides(const Pull& pull, const HSplineSurface& face, ControlNet& net) {
-  constexpr double kMidline = 0.5;  // a part of m: nearer to the midline, the sides hold each other
-  const Vec3 left = LeftOf(face);
+  // Near the midline m - o is small, and d would grow without bound. Below this part of m the point
+  // does not move sideways at all.
+  constexpr double kMidline = 0.5;
+  const Vec3 left = FindLeft(face);
   const Vec2 other_uv(1 - pull.uv.x(), pull.uv.y());
   const auto own = SharesAround(face.shape(), pull.level, pull.uv, pull.reach);
   const auto other = SharesAround(face.shape(), pull.level, other_uv, pull.reach);
@@ -85,14 +88,9 @@ void MoveBothSides(const Pull& pull, const HSplineSurface& face, ControlNet& net
   MoveBy(other, along - sideways, net);
 }
 
-std::optional<std::array<double, 3>> ToArray(const std::optional<Vec3>& v) {
-  return v ? std::optional(std::array{v->x(), v->y(), v->z()}) : std::nullopt;
-}
-
-// What vertices of level 0 are moved by in all, of those that moved now.
-std::map<VertexId, std::optional<Vec3>> MovesInAll(const ControlNet& before,
-                                                   const ControlNet& after,
-                                                   const EditScript& script) {
+// The total moves, by the script and now, of the level-0 vertices that moved now.
+std::map<VertexId, std::optional<Vec3>> SumMoves(const ControlNet& before, const ControlNet& after,
+                                                 const EditScript& script) {
   std::map<VertexId, std::optional<Vec3>> moves;
   for (int j = 0; j < before.rows; ++j) {
     for (int i = 0; i < before.columns; ++i) {
@@ -113,7 +111,7 @@ std::map<VertexId, std::optional<Vec3>> MovesInAll(const ControlNet& before,
 
 }  // namespace
 
-Vec3 LeftOf(const HSplineSurface& face) {
+Vec3 FindLeft(const HSplineSurface& face) {
   Vec3 sum = Vec3::Zero();
   for (const double v : {0.2, 0.35, 0.5, 0.65, 0.8}) {
     for (const double u : {0.55, 0.6, 0.65, 0.7, 0.75}) {
@@ -121,7 +119,7 @@ Vec3 LeftOf(const HSplineSurface& face) {
     }
   }
   if (!(sum.norm() > 1e-6)) {
-    throw InputError("pull: the face does not say where left and right are; pull without mirror");
+    throw InputError("pull: the face does not distinguish left and right; pull without mirror");
   }
   return sum.normalized();
 }
@@ -131,7 +129,7 @@ EditScript WithOffsets(EditScript script, const std::map<VertexId, std::optional
     return offsets.contains({edit.level, edit.i, edit.j});
   });
   for (const auto& [vertex, offset] : offsets) {
-    script.edits.push_back({vertex.level, vertex.i, vertex.j, ToArray(offset)});
+    script.edits.push_back(MakeEdit(vertex, offset));
   }
   return script;
 }
@@ -148,7 +146,7 @@ EditScript Pulled(const Pull& pull, const HSplineSurface& face, const EditScript
     MoveBy(shares, pull.by_mm / moved, after);
   }
   if (pull.level == 0) {
-    return WithOffsets(script, MovesInAll(before, after, script));
+    return WithOffsets(script, SumMoves(before, after, script));
   }
   HSplineSurface pulled = face;
   pulled.SetNet(pull.level, after);

@@ -17,8 +17,9 @@ using Matrix = Eigen::MatrixXd;
 
 enum class Along { kU, kV };
 
-// (A'A)^-1 A', A's row s the weights of a line's vertices at its sample s: a stencil's weights
-// summed over the other direction are those of the line.
+// Returns (A'A)^-1 A', which maps the samples of a line of the grid to its B-spline vertices. Row s
+// of A holds the weights of the vertices at sample s. Summed over the other direction, the weights
+// of a surface's stencil are those of the line.
 Matrix LeastSquares(const HSplineShape& shape, int level, Along along, int samples) {
   const int columns = shape.Columns(level);
   Matrix rows = Matrix::Zero(samples, along == Along::kU ? columns : shape.Rows(level));
@@ -42,13 +43,16 @@ std::size_t DomainGrid::NearestTo(const Vec2& uv) const {
   return cell(uv.x(), columns) + columns * cell(uv.y(), rows);
 }
 
-DomainGrid GridOf(const HSplineShape& shape) {
-  constexpr int kPerPatch = 3, kPatches = 32;  // at least so many patches' worth
+DomainGrid MakeDomainGrid(const HSplineShape& shape) {
+  constexpr int kPerPatch = 3;
+  constexpr int kLeastPatches = 32;  // coarse surfaces are sampled as if they had so many
   if (shape.closure != Closure::kOpen) {
     throw InputError(fmt::format("template: the surface is {}; a prior needs one that is open",
                                  EnumNames(shape.closure)[static_cast<int>(shape.closure)]));
   }
-  const auto samples = [=](int patches) { return kPerPatch * std::max(patches, kPatches) + 1; };
+  const auto samples = [=](int patches) {
+    return kPerPatch * std::max(patches, kLeastPatches) + 1;
+  };
   return {samples(shape.PatchesU(shape.max_level)), samples(shape.PatchesV(shape.max_level))};
 }
 

@@ -20,20 +20,20 @@ struct DomainGrid {
     return {static_cast<double>(k % columns) / (columns - 1),
             static_cast<double>(k / columns) / (rows - 1)};
   }
-  std::size_t NearestTo(const Vec2& uv) const;
+  std::size_t NearestTo(const Vec2& uv) const;  // index of the point
 };
 
-// At least three samples along each side of a patch of the finest level. Throws InputError for a
-// surface that is not open.
-DomainGrid GridOf(const HSplineShape& shape);
+// Three samples along each side of a patch of the finest level, and at least 97 along each side of
+// the domain. Throws InputError for a surface that is not open.
+DomainGrid MakeDomainGrid(const HSplineShape& shape);
 
-// The plain B-spline of one level that is closest to the samples, by least squares; mm. On such a
-// grid that is the least squares of its columns, then of its rows.
+// The least-squares fit of one level's plain B-spline to the samples (mm). On a regular grid it is
+// enough to fit the columns and then the rows.
 ControlNet NetThrough(const HSplineShape& shape, int level, const DomainGrid& grid,
                       std::span<const Vec3> samples);
 
-// Level 0 is the least-squares fit of the samples; each finer level moves the vertices where its
-// own least-squares fit differs by more than tolerance_mm.
+// An H-spline through the samples. Level 0 is their least-squares fit. Each finer level moves those
+// of its vertices that its own least-squares fit moves by more than tolerance_mm.
 HSplineSurface SurfaceThrough(const HSplineShape& shape, const DomainGrid& grid,
                               std::span<const Vec3> samples, double tolerance_mm = 0.02);
 

@@ -1,11 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/face_template/head_formula.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cassert>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <limits>
 #include <numbers>
+#include <string_view>
 #include <vector>
+
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
@@ -72,12 +81,12 @@ Curve Column(const Row (&rows)[count], double Row::*t, double Row::*y) {
 
 constexpr double kAxisY = 95;  // mm behind nasion: the vertical axis of the azimuth
 constexpr double kEdgeAzimuth = 110 * std::numbers::pi / 180;
-constexpr double kAzimuthCubic = 0.6;  // > 0: the middle of the face gets more of u than its sides
+constexpr double kAzimuthCubic = 0.6;  // > 0 gives the middle of the face more of u than its sides
 
-// A rib runs round the head at constant v: an ellipse seen from above, pinched (k > 0) or boxy
-// (k < 0) between its axes, which rises by `rise` from the midline to the side.
+// A rib runs round the head at constant v. Seen from above it is an ellipse. Between its axes it is
+// pinched (pinch > 0) or boxy (pinch < 0). It rises by `rise` from the midline to the side.
 struct Rib {
-  double v, y, z;     // of the midline point, mm
+  double v, y, z;     // of the midline point; y and z in mm
   double half_width;  // at 90 deg, mm
   double pinch;
   double rise;  // from the midline to 90 deg, mm
@@ -100,7 +109,7 @@ constexpr Rib kRibs[] = {
 };
 
 struct BasePoint {
-  double azimuth_deg = 0;  // 0 in the midline, > 0; of the half of the face
+  double azimuth_deg = 0;  // 0 on the midline, positive on both halves of the face
   double x = 0, y = 0, z = 0;
   double sine = 0, cosine = 1;  // of the azimuth
 };
@@ -146,7 +155,8 @@ double SmoothStep(double x, double from, double to) {
   return t * t * t * (t * (6 * t - 15) + 10);
 }
 
-// A hill (height > 0) or hollow on the front, in the frontal plane of the base, pushed forward.
+// A hill (height > 0) or hollow on the front. Its place is one in the frontal plane of the base,
+// and it is pushed forward.
 struct FrontBump {
   double x, z, sigma_x, sigma_z, height;  // mm
   double tilt_deg;                        // > 0 raises the lateral end
@@ -184,7 +194,7 @@ double FrontHeight(double x, double z) {
       return b.height * Bell(std::cos(slope) * dx + std::sin(slope) * dz, b.sigma_x) *
              Bell(std::cos(slope) * dz - std::sin(slope) * dx, b.sigma_z);
     };
-    // a hill off the midline has its twin, so that the halves join smoothly
+    // A hill off the midline has a twin on the other side, so that the halves join smoothly.
     sum += b.x > 0 ? hill(b.x) + hill(-b.x) : hill(0);
   }
   return sum;
@@ -211,8 +221,8 @@ double LeftLidHeight(double x, double z) {
 
 double LidHeight(double x, double z) { return LeftLidHeight(x, z) + LeftLidHeight(-x, z); }
 
-// The nose drawn in profile over the base: how far each height of the midline goes forward and
-// down, and how wide it is there.
+// The profile of the nose over the base: for each height on the midline, the offset forward and
+// down, and the width of the nose there.
 struct NoseSection {
   double z;           // of the base, mm
   double forward;     // mm
@@ -239,7 +249,7 @@ Vec3 NoseOffset(double x, double z) {
   return {0, -profile * forward(z), -profile * down(z)};
 }
 
-// The wing of the nose, the groove behind it and a hint of the nostril, of the left side.
+// The left wing of the nose, the groove behind it and a hint of the nostril.
 Vec3 LeftAlaOffset(double x, double z) {
   const double wing = Bell(x - 13, 4.2) * Bell(z + 43, 4.2);
   const double groove = Bell(x - 20, 3) * Bell(z + 44, 6);
@@ -256,7 +266,7 @@ Vec3 AlaOffset(double x, double z) {
 // The sides
 // ---------------------------------------------------------------------------------------------
 
-// A hill or hollow on the side, by azimuth and height, pushed away from the axis.
+// A hill or hollow on the side, placed by azimuth and height, and pushed away from the axis.
 struct SideBump {
   double azimuth_deg, z;  // deg, mm
   double sigma_deg, sigma_z, height;
@@ -293,6 +303,155 @@ Vec3 HeadPoint(double u, double v) {
   p += NoseOffset(b.x, b.z) + AlaOffset(b.x, b.z);
   p.x() = std::copysign(p.x(), t);
   return p;
+}
+
+namespace {
+
+// The soft-tissue point of a landmark on an average adult; the left one of a pair.
+struct SkinSite {
+  std::string_view code;  // without side, as Site::landmark
+  Vec3 near_skin;         // in the frame of HeadPoint, mm; near the skin, not exactly on it
+};
+
+// Heights and widths follow the definitions of the sites on the skull. Each point is moved out to
+// the skin in the direction of the site's dowel.
+const SkinSite kAverageSkin[] = {
+    {"sg", {0, 0, 25}},       // the shallow above glabella
+    {"g", {0, -2, 13}},       // most forward point of the brow
+    {"n", {0, 1, 1}},         // the root of the nose
+    {"rhi", {0, -10, -16}},   // the bony end of the bridge
+    {"mp", {0, -6, -60}},     // the middle of the philtrum
+    {"pr", {0, -11, -69.5}},  // the middle of the upper lip
+    {"id", {0, -7, -85}},     // the middle of the lower lip
+    {"sm", {0, 4, -94}},      // the deepest of the chin-lip fold
+    {"pg", {0, 1, -107}},     // most forward point of the chin
+    {"me", {0, 19, -121}},    // the underside of the chin; its dowel points down
+    {"fe", {34, 14, 47}},     // the forehead's fullest, over the middle of the brow
+    {"mso", {31, 8, 12}},     // the brow over the middle of the orbit
+    {"mio", {35, 9, -26}},    // below the middle of the orbit, on its rim
+    {"im", {42, 10, -45}},    // the lower border of the cheek bone, below mio
+    {"lo", {50, 14, -37}},    // below the lateral margin of the orbit, 10 mm under its floor
+    {"zy", {71, 62, -30}},    // halfway along the zygomatic arch
+    {"sgl", {72, 83, -29}},   // the root of the arch, before and above the ear opening
+    {"go", {61, 74, -84}},    // the angle of the jaw
+    {"sM2", {57, 39, -58}},   // the cheek over the second upper molar
+    {"mr", {65, 58, -70}},    // the ramus at the height of the mouth
+    {"iM2", {51, 33, -82}},   // the cheek over the second lower molar
+};
+
+// Points on the formula's own features; the left one of a pair.
+const SkinSite kFacialLandmarks[] = {
+    {"prn", {0, -45, -44}},   // the tip of the nose, which is closest to a point in front of it
+    {"sn", {0, -7, -54.5}},   // where the septum meets the philtrum
+    {"sbal", {12, -8, -52}},  // under the wing
+    {"en", {18, 11, -7}},     // ends of the line between the lids
+    {"ex", {45, 25, -6}},     //
+    {"ch", {26, 6, -75.5}},   //
+    {"ls", {0, -8, -66}},     // borders of the lips, and the line between them
+    {"sto", {0, -6, -74.5}},  //
+    {"li", {0, -6, -85}},     //
+};
+
+const Vec3& NearSkin(const Site& site) {
+  const auto* const found = std::ranges::find(kAverageSkin, site.landmark, &SkinSite::code);
+  assert(found != std::end(kAverageSkin));
+  return found->near_skin;
+}
+
+double DistanceSquared(const Vec2& uv, const Vec3& near_skin) {
+  return (HeadPoint(uv.x(), uv.y()) - near_skin).squaredNorm();
+}
+
+// The closest grid point of the left half (last_u = 1) or of the midline (last_u = 0.5).
+Vec2 ClosestOnGrid(const Vec3& near_skin, double last_u) {
+  constexpr int kSteps = 60;
+  double least = std::numeric_limits<double>::infinity();
+  Vec2 best = Vec2::Constant(kNaN);
+  for (int j = 0; j <= 2 * kSteps; ++j) {
+    for (int i = 0; i <= (last_u > 0.5 ? kSteps : 0); ++i) {
+      const Vec2 uv(0.5 + (last_u - 0.5) * i / kSteps, j / (2.0 * kSteps));
+      if (const double d = DistanceSquared(uv, near_skin); d < least) {
+        least = d;
+        best = uv;
+      }
+    }
+  }
+  return best;
+}
+
+// Pattern search from the best point of the grid. It halves the step when no neighbour is closer.
+Vec2 Closest(const Vec3& near_skin, double last_u) {
+  Vec2 best = ClosestOnGrid(near_skin, last_u);
+  double least = DistanceSquared(best, near_skin);
+  for (double step = 0.5 / 60; step > 1e-9;) {
+    const double u_step = last_u > 0.5 ? step : 0;
+    const Vec2 start = best;
+    for (const Vec2& d : {Vec2(u_step, 0), Vec2(-u_step, 0), Vec2(0, step), Vec2(0, -step)}) {
+      const Vec2 uv = (start + d).cwiseMax(Vec2(0.5, 0)).cwiseMin(Vec2(last_u, 1));
+      if (const double distance = DistanceSquared(uv, near_skin); distance < least) {
+        least = distance;
+        best = uv;
+      }
+    }
+    step = best == start ? step / 2 : step;
+  }
+  return best;
+}
+
+}  // namespace
+
+std::map<std::string, Vec2> TemplateSites() {
+  std::map<std::string, Vec2> sites;
+  for (const Site& site : StandardSites()) {
+    if (site.side == Side::kRight) {
+      const Vec2& left = sites.at(site.mirror);
+      sites[site.code] = Vec2(1 - left.x(), left.y());
+    } else {
+      sites[site.code] = Closest(NearSkin(site), site.side == Side::kMidline ? 0.5 : 1);
+    }
+  }
+  return sites;
+}
+
+std::map<std::string, Vec2> FacialLandmarks() {
+  std::map<std::string, Vec2> landmarks;
+  for (const SkinSite& place : kFacialLandmarks) {
+    const std::string code(place.code);
+    if (place.near_skin.x() == 0) {
+      landmarks[code] = Closest(place.near_skin, 0.5);
+    } else {
+      const Vec2 left = Closest(place.near_skin, 1);
+      landmarks[code + "_l"] = left;
+      landmarks[code + "_r"] = Vec2(1 - left.x(), left.y());
+    }
+  }
+  return landmarks;
+}
+
+std::vector<std::string> FacialLandmarkCodes() {
+  std::vector<std::string> codes;
+  for (const SkinSite& place : kFacialLandmarks) {
+    const std::string code(place.code);
+    const bool midline = place.near_skin.x() == 0;
+    codes.push_back(midline ? code : code + "_l");
+    if (!midline) {
+      codes.push_back(code + "_r");
+    }
+  }
+  return codes;
+}
+
+Vec2 UvOnGenericHead(const std::string& code) {
+  static const std::map<std::string, Vec2> places = [] {
+    std::map<std::string, Vec2> all = TemplateSites();
+    all.merge(FacialLandmarks());
+    return all;
+  }();
+  const auto found = places.find(code);
+  if (found == places.end()) {
+    throw InputError(fmt::format("landmark '{}' is not known on the generic head", code));
+  }
+  return found->second;
 }
 
 }  // namespace semblance

@@ -11,7 +11,7 @@
 #include <optional>
 #include <string_view>
 
-#include "problems/face_template/template_sites.h"
+#include "problems/face_template/head_formula.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
@@ -24,13 +24,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the 68 points those that stand at a place with a name. The subject's right comes first.
+// The points of Multi-PIE that are named facial landmarks. The subject's right comes first.
 const std::map<int, std::string> kMultiPie = {
     {31, "prn"},  {34, "sn"},   {32, "sbal_r"}, {36, "sbal_l"}, {37, "ex_r"},
     {40, "en_r"}, {43, "en_l"}, {46, "ex_l"},   {49, "ch_r"},   {55, "ch_l"},
     {52, "ls"},   {58, "li"},   {63, "sto"}};
 
-Vec3 PointOf(const CsvReader& csv, const std::array<std::size_t, 3>& columns) {
+Vec3 ReadPoint(const CsvReader& csv, const std::array<std::size_t, 3>& columns) {
   return {csv.Number(columns[0]), csv.Number(columns[1]), csv.Number(columns[2])};
 }
 
@@ -69,26 +69,26 @@ void ReadCsv(const fs::path& file, SkinLandmarks& landmarks) {
         multipie ? MultiPieCode(csv, csv.Number(name)) : std::string(csv.Cell(name));
     if (code) {
       CheckCode(csv, *code);
-      landmarks.points.push_back({*code, PointOf(csv, columns)});
+      landmarks.points.push_back({*code, ReadPoint(csv, columns)});
     }
   }
 }
 
-std::optional<double> DepthOf(const Landmark& landmark) {
+std::optional<double> SkinDepth(const Landmark& landmark) {
   return landmark.depth_along_normal_mm ? landmark.depth_along_normal_mm
                                         : landmark.depth_closest_mm;
 }
 
 Vec3 ToVec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
 
-void ReadOfSkull(const fs::path& file, SkinLandmarks& landmarks) {
+void ReadSkullLandmarks(const fs::path& file, SkinLandmarks& landmarks) {
   LandmarkReading reading = ReadLandmarks(file);
   std::ranges::move(reading.notes, std::back_inserter(landmarks.notes));
   const LandmarkFile& skull = reading.file;
   const bool on_skin = std::ranges::none_of(
-      skull.landmarks, [](const Landmark& landmark) { return DepthOf(landmark).has_value(); });
+      skull.landmarks, [](const Landmark& landmark) { return SkinDepth(landmark).has_value(); });
   for (const Landmark& landmark : skull.landmarks) {
-    const std::optional<double> depth_mm = DepthOf(landmark);
+    const std::optional<double> depth_mm = SkinDepth(landmark);
     if (on_skin) {
       landmarks.points.push_back({landmark.site, ToVec3(landmark.point)});
     } else if (depth_mm && landmark.normal) {
@@ -121,11 +121,11 @@ SkinLandmarks ReadSkinLandmarks(std::span<const fs::path> files) {
     if (LowerCase(file.extension().string()) == ".csv") {
       ReadCsv(file, landmarks);
     } else {
-      ReadOfSkull(file, landmarks);
+      ReadSkullLandmarks(file, landmarks);
     }
   }
   if (landmarks.points.empty()) {
-    throw InputError("no landmark was given; name at least one file of them");
+    throw InputError("no landmark was given; name at least one file of landmarks");
   }
   CheckOnce(landmarks);
   return landmarks;

@@ -10,7 +10,6 @@
 
 #include "problems/face_template/domain_grid.h"
 #include "problems/face_template/head_formula.h"
-#include "problems/face_template/template_sites.h"
 #include "problems/subject/phantom_shape.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
@@ -18,9 +17,9 @@
 namespace semblance {
 namespace {
 
-// The plain B-spline of one level that is closest to the formula over a grid of samples.
+// The least-squares fit of one level's plain B-spline to a grid of samples of the formula.
 ControlNet FitFormula(const HSplineShape& shape, int level) {
-  constexpr int kSamplesPerPatch = 6;
+  constexpr int kSamplesPerPatch = 6;  // along each side; more cost time
   const DomainGrid grid{kSamplesPerPatch * shape.PatchesU(level) + 1,
                         kSamplesPerPatch * shape.PatchesV(level) + 1};
   std::vector<Vec3> samples;
@@ -31,7 +30,7 @@ ControlNet FitFormula(const HSplineShape& shape, int level) {
   return NetThrough(shape, level, grid, samples);
 }
 
-// Makes the net its own mirror image, so that rounding does not tell the sides apart.
+// Makes the net its own mirror image, so that both sides are rounded alike.
 void MakeSymmetric(ControlNet& net) {
   for (int j = 0; j < net.rows; ++j) {
     for (int i = 0; 2 * i < net.columns; ++i) {
@@ -48,7 +47,7 @@ void MakeSymmetric(ControlNet& net) {
 // The surface and its features
 // ---------------------------------------------------------------------------------------------
 
-// Moves to the level's own least-squares fit each vertex that this moves by more than the
+// Takes the vertices of the level's own least-squares fit where they differ by more than the
 // tolerance.
 void AddDetail(HSplineSurface& surface, int level, double tolerance_mm) {
   ControlNet target = FitFormula(surface.shape(), level);
@@ -74,7 +73,7 @@ const HeadFeature kHeadFeatures[] = {
     {"eye_r", {{-31.5, 14, -3}, 19}},
 };
 
-// The vertices of levels >= 1 whose own (u,v) lies on the surface inside the region.
+// The vertices of levels >= 1 whose (u,v) is a point of the surface inside the region.
 std::vector<VertexId> VerticesInside(const HSplineSurface& surface, const Sphere& region) {
   const HSplineShape& shape = surface.shape();
   std::vector<VertexId> inside;
@@ -91,7 +90,7 @@ std::vector<VertexId> VerticesInside(const HSplineSurface& surface, const Sphere
   return inside;
 }
 
-void CheckOptions(const FormulaTemplate& o) {
+void CheckFormulaOptions(const FormulaTemplate& o) {
   const auto check = [](const char* name, double value, double least, double most) {
     if (!(value >= least && value <= most)) {
       throw InputError(
@@ -117,7 +116,7 @@ void Disturb(double error, std::uint64_t random_seed, std::map<std::string, Vec2
 }  // namespace
 
 TemplateFace MakeTemplateFace(const FormulaTemplate& options) {
-  CheckOptions(options);
+  CheckFormulaOptions(options);
   const HSplineShape shape{.patches_u = options.patches_u,
                            .patches_v = options.patches_v,
                            .max_level = options.max_level,
@@ -129,14 +128,14 @@ TemplateFace MakeTemplateFace(const FormulaTemplate& options) {
     AddDetail(surface, level, options.detail_tolerance_mm);
   }
   TemplateFace face{.surface = std::move(surface), .site_uv = TemplateSites(), .features = {}};
-  face.features = FeaturesOfGenericHead(face.surface);
+  face.features = GenericHeadFeatures(face.surface);
   if (options.site_error > 0) {
     Disturb(options.site_error, options.site_random_seed, face.site_uv);
   }
   return face;
 }
 
-std::vector<TemplateFeature> FeaturesOfGenericHead(const HSplineSurface& surface) {
+std::vector<TemplateFeature> GenericHeadFeatures(const HSplineSurface& surface) {
   std::vector<TemplateFeature> features;
   for (const HeadFeature& f : kHeadFeatures) {
     features.push_back({f.name, VerticesInside(surface, f.region), f.region});

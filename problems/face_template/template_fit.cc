@@ -11,43 +11,44 @@
 
 #include "fitting/fit.h"
 #include "problems/face_template/head_formula.h"
-#include "problems/face_template/skin_matcher.h"
-#include "problems/face_template/template_sites.h"
+#include "problems/face_template/skin_distance.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/hspline_project.h"
 
 namespace semblance {
 namespace {
 
-constexpr int kCoarsestEnd = 3, kFinestEnd = 6;
-constexpr double kLength_mm = 10;      // of smoothness
-constexpr double kMembrane = 2e-4;     // holds what has no match in place, hardly more
-constexpr double kFacialWeight = 0.3;  // of facial landmarks, in the levels that still slide
+constexpr int kCoarsestEnd = 3, kFinestEnd = 6;  // levels at which the fit may end
+constexpr double kLength_mm = 10;                // length scale of the smoothness term
+// Just enough to hold parts without a match in place; more would hold back the matched parts too.
+constexpr double kMembrane = 2e-4;
+// Facial landmarks guide the coarse levels, in which the surface still slides. On finer levels the
+// matches alone decide.
+constexpr double kFacialWeight = 0.3;
 constexpr int kLastLandmarkLevel = 2;
-constexpr double kThinnest_mm = 0.02;  // of an offset that is kept
+constexpr double kThinnest_mm = 0.02;  // shorter offsets are dropped: nobody sees them
 
-// How a level is fitted.
 struct LevelPlan {
   int rounds;            // of matching and fitting
   int samples;           // along each side of a patch
   double reach_mm;       // of a match
-  double wavelength_mm;  // of displacement, that smoothness halves: two patches
+  double wavelength_mm;  // displacements of this wavelength (two patches) are halved
 };
 
-LevelPlan PlanOf(int level) {
+LevelPlan PlanLevel(int level) {
   constexpr LevelPlan kPlans[] = {{8, 6, 40, 80}, {6, 4, 20, 40}, {5, 3, 10, 20}, {4, 3, 6, 10},
                                   {3, 2, 4, 5},   {3, 2, 3, 2.5}, {2, 2, 3, 1.25}};
   return kPlans[level];
 }
 
-// The ears: the formula has none, and matches there would drag the cheek along.
+// The formula has no ears. Matches there would drag the cheek along.
 bool InEar(const Vec2& uv) {
   constexpr double kMiddleY = 110, kMiddleZ = -40, kHalfWidth = 24, kHalfHeight = 56;  // mm
   const Vec3 p = HeadPoint(uv.x(), uv.y());
   return std::hypot((p.y() - kMiddleY) / kHalfWidth, (p.z() - kMiddleZ) / kHalfHeight) < 1;
 }
 
-FitTarget TargetOf(const MatchGrid& grid) {
+FitTarget MakeTarget(const MatchGrid& grid) {
   FitTarget target;
   for (std::size_t k = 0; k < grid.uv.size(); ++k) {
     if (grid.skin[k] && !InEar(grid.uv[k])) {
@@ -71,8 +72,8 @@ std::vector<FitPoint> FacialPoints(const OuterHead& head) {
   return points;
 }
 
-FitOptions OptionsOf(int level, bool landmarks) {
-  const double wave = PlanOf(level).wavelength_mm / (2 * std::numbers::pi * kLength_mm);
+FitOptions MakeFitOptions(int level, bool landmarks) {
+  const double wave = PlanLevel(level).wavelength_mm / (2 * std::numbers::pi * kLength_mm);
   FitOptions options{
       .plan = ListedPlan{.schedule = {{level, 1}}},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = std::pow(wave, 4), .length_mm = kLength_mm},
@@ -98,7 +99,7 @@ class TemplateFitter {
         surface_(std::move(start.surface)) {}
 
   TemplateLevel FitLevel(int level) {
-    const LevelPlan plan = PlanOf(level);
+    const LevelPlan plan = PlanLevel(level);
     TemplateLevel done{.level = level, .rounds = plan.rounds};
     for (int round = 0; round < plan.rounds; ++round) {
       context_.ThrowIfStopped();
@@ -108,16 +109,16 @@ class TemplateFitter {
   }
 
   const HSplineSurface& surface() const { return surface_; }
-  bool usable() const { return usable_; }  // every solution so far
+  bool usable() const { return usable_; }  // whether every solution so far was
 
  private:
-  // Returns the part of the samples that found skin.
+  // Returns the part of the samples that matched the skin.
   double FitRound(int level, const LevelPlan& plan) {
     const HSplineShape& shape = surface_.shape();
     const MatchGrid grid =
         MatchToSkin(surface_, matcher_, plan.samples * shape.PatchesU(level),
                     plan.samples * shape.PatchesV(level), plan.reach_mm, context_.threads);
-    FitTarget target = TargetOf(grid);
+    FitTarget target = MakeTarget(grid);
     if (target.points.empty()) {
       throw InputError("no point of the generic head finds skin near it; check the landmarks");
     }
@@ -128,7 +129,7 @@ class TemplateFitter {
       target.points.insert(target.points.end(), facial_.begin(), facial_.end());
     }
     const RunContext silent{.on_event = {}, .stop_token = {}, .threads = context_.threads};
-    FitResult fit = Fit(surface_, rest_, target, {}, OptionsOf(level, landmarks), silent);
+    FitResult fit = Fit(surface_, rest_, target, {}, MakeFitOptions(level, landmarks), silent);
     usable_ = usable_ && fit.usable;
     surface_ = std::move(fit.surface);
     return matched;
@@ -142,7 +143,7 @@ class TemplateFitter {
   bool usable_ = true;
 };
 
-// Without offsets that move the surface less than anyone sees, and without empty levels.
+// The surface without negligible offsets and without empty levels.
 HSplineSurface Thinned(const HSplineSurface& surface, int finest) {
   HSplineShape shape = surface.shape();
   shape.max_level = finest;
@@ -185,7 +186,7 @@ std::vector<TemplateFeature> UpToLevel(std::vector<TemplateFeature> features, in
   return features;
 }
 
-void CheckOptions(const TemplateFitOptions& o) {
+void CheckFitOptions(const TemplateFitOptions& o) {
   if (!(o.finest >= kCoarsestEnd && o.finest <= kFinestEnd)) {
     throw InputError(fmt::format("template: finest is {}; it must lie in [{}, {}]", o.finest,
                                  kCoarsestEnd, kFinestEnd));
@@ -204,7 +205,7 @@ std::vector<Vec2> SitePlaces() {
   return places;
 }
 
-// Fits levels until one meets the tolerance, or all.
+// Fits one level after the other, until one meets the tolerance or all are done.
 std::vector<TemplateLevel> FitLevels(const TemplateFitOptions& options,
                                      const TemplateDistance& distance, const RunContext& context,
                                      TemplateFitter& fitter) {
@@ -224,7 +225,7 @@ std::vector<TemplateLevel> FitLevels(const TemplateFitOptions& options,
   return levels;
 }
 
-// What is measured of the face when it is done.
+// Measures the finished face.
 void Measure(const OuterHead& head, const TemplateFitOptions& options,
              const TemplateDistance& distance, int threads, TemplateFit& fit) {
   const HSplineSurface& surface = fit.face.surface;
@@ -247,7 +248,7 @@ void Measure(const OuterHead& head, const TemplateFitOptions& options,
 
 TemplateFit FitTemplate(const OuterHead& head, const TemplateFitOptions& options,
                         const RunContext& context) {
-  CheckOptions(options);
+  CheckFitOptions(options);
   TemplateFace start = WarpedGenericHead(head, options.finest);
   std::vector<TemplateFeature> features = start.features;
   TemplateFitter fitter(head, std::move(start), context);

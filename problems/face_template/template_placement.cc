@@ -14,7 +14,6 @@
 #include "fitting/problem/placement.h"
 #include "interp/dowels/dowel.h"
 #include "problems/face_template/head_formula.h"
-#include "problems/face_template/template_sites.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/thin_plate.h"
@@ -25,12 +24,15 @@
 namespace semblance {
 namespace {
 
-constexpr int kFewestMidline = 3, kFewestPairs = 2;
-constexpr double kSmallestScale = 0.75, kLargestScale = 1.35;
-constexpr double kFarthest_mm = 10;   // of a landmark from the skin
-constexpr double kPieceOfHead = 0.5;  // of the largest piece's diagonal
-constexpr int kFormulaLevel = 3;      // finest with detail
-constexpr double kSiteWeight = 0.1;   // of a facial landmark's
+constexpr int kFewestMidline = 3, kFewestPairs = 2;            // as the header states
+constexpr double kSmallestScale = 0.75, kLargestScale = 1.35;  // of heads against the generic one
+constexpr double kFarthest_mm = 10;                            // of a landmark from the skin
+// A piece whose diagonal exceeds this part of the largest piece's may be a second head. Smaller
+// ones (eyes, hair, ears) are not reported.
+constexpr double kPieceOfHead = 0.5;
+constexpr int kFormulaLevel = 3;     // finest level of the formula's detail
+constexpr double kSiteWeight = 0.1;  // of a site of bone, against 1 of a facial landmark
+// A stiffer plate follows the landmarks less; a softer one copies their errors into the start.
 constexpr double kPlateStiffness_mm = 0.1;
 
 // ---------------------------------------------------------------------------------------------
@@ -51,7 +53,7 @@ std::vector<Box3> PieceBoxes(const TriMesh& mesh) {
 // Inner layers lie inside the largest piece's box; a second head does not.
 void CheckOneHead(const TriMesh& mesh, const std::string& name) {
   if (mesh.triangles.empty()) {
-    return;  // CheckHeadMesh says so
+    return;  // CheckHeadMesh reports this
   }
   const std::vector<Box3> boxes = PieceBoxes(mesh);
   const auto size = [](const Box3& box) { return box.diagonal().norm(); };
@@ -102,11 +104,11 @@ void CheckEnough(const std::vector<SkinLandmark>& points, const std::string& nam
 }
 
 // The same landmarks on the formula and on the head.
-struct Correspondence {
+struct LandmarkPairs {
   std::vector<Vec3> generic, head;
   std::vector<double> weights;
 
-  explicit Correspondence(const std::vector<SkinLandmark>& points) {
+  explicit LandmarkPairs(const std::vector<SkinLandmark>& points) {
     for (const SkinLandmark& landmark : points) {
       const Vec2 uv = UvOnGenericHead(landmark.code);
       generic.push_back(HeadPoint(uv.x(), uv.y()));
@@ -117,22 +119,22 @@ struct Correspondence {
   Similarity HeadFromGeneric() const { return PlaceTemplate(generic, head, weights); }
 };
 
-double MisfitOf(const Correspondence& pairs) {
+double ComputeMisfit(const LandmarkPairs& pairs) {
   const Similarity head_from_generic = pairs.HeadFromGeneric();
   double sum = 0;
   for (std::size_t i = 0; i < pairs.generic.size(); ++i) {
     sum += pairs.weights[i] * (head_from_generic * pairs.generic[i] - pairs.head[i]).squaredNorm();
   }
-  // of the similarity's size, as a small image has small misfits
+  // Relative to the scale, because a small image has small misfits.
   return std::sqrt(sum) / head_from_generic.scale;
 }
 
-void CheckHandedness(const Correspondence& pairs) {
-  Correspondence mirrored = pairs;
+void CheckHandedness(const LandmarkPairs& pairs) {
+  LandmarkPairs mirrored = pairs;
   for (Vec3& p : mirrored.generic) {
     p.x() = -p.x();
   }
-  if (MisfitOf(mirrored) < MisfitOf(pairs)) {
+  if (ComputeMisfit(mirrored) < ComputeMisfit(pairs)) {
     throw InputError(
         "a mirror image of the generic head meets the landmarks better than the head itself: left "
         "and right have changed places, or mesh and landmarks are not LPS; swap _l and _r, or "
@@ -140,7 +142,7 @@ void CheckHandedness(const Correspondence& pairs) {
   }
 }
 
-// One pair that has changed places leaves the handedness of all as it is.
+// A single exchanged pair does not change the handedness of all landmarks together.
 void CheckEachPair(const std::vector<SkinLandmark>& points, const Vec3& leftward) {
   std::map<std::string, Vec3> at;
   for (const SkinLandmark& landmark : points) {
@@ -175,8 +177,8 @@ void CheckScale(double scale, const std::string& name) {
                   name, scale, kSmallestScale, kLargestScale, guess));
 }
 
-std::vector<SkinLandmark> OnSkin(const std::vector<SkinLandmark>& points, const TriMesh& skin,
-                                 const std::string& name) {
+std::vector<SkinLandmark> MoveToSkin(const std::vector<SkinLandmark>& points, const TriMesh& skin,
+                                     const std::string& name) {
   const MeshQuery query(skin);
   std::vector<SkinLandmark> on_skin;
   for (const SkinLandmark& landmark : points) {
@@ -204,12 +206,12 @@ TemplateFace GenericHead(int max_level) {
   shape.max_level = max_level;
   HSplineSurface finer(shape, face.surface.Net(0));
   finer.SetOffsets({face.surface.Offsets().begin(), face.surface.Offsets().end()});
-  face.features = FeaturesOfGenericHead(finer);
+  face.features = GenericHeadFeatures(finer);
   face.surface = std::move(finer);
   return face;
 }
 
-// Each stored vertex goes where the map takes it, which is close to what it does to the surface.
+// Maps each stored vertex. This is close to mapping the surface itself.
 template <class Map>
 HSplineSurface Warped(const HSplineSurface& surface, const Map& map) {
   ControlNet coarse = surface.Net(0);
@@ -226,10 +228,10 @@ HSplineSurface Warped(const HSplineSurface& surface, const Map& map) {
   return warped;
 }
 
-// Of where the landmarks place the generic head. What they leave open names the head too.
+// Checks where the landmarks place the generic head. Its messages name the head, too.
 void CheckPlace(const std::vector<SkinLandmark>& points, const std::string& name) try {
   CheckSides(points);
-  CheckScale(Correspondence(points).HeadFromGeneric().scale, name);
+  CheckScale(LandmarkPairs(points).HeadFromGeneric().scale, name);
 } catch (const InputError& error) {
   const std::string words = error.what();
   throw InputError(words.starts_with(name) ? words
@@ -239,27 +241,27 @@ void CheckPlace(const std::vector<SkinLandmark>& points, const std::string& name
 }  // namespace
 
 void CheckSides(const std::vector<SkinLandmark>& points) {
-  const Correspondence pairs(points);
+  const LandmarkPairs pairs(points);
   CheckHandedness(pairs);
   CheckEachPair(points, pairs.HeadFromGeneric().rotation * Vec3::UnitX());
 }
 
 OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const std::string& name,
                       const RunContext& context) {
-  CheckOneHead(head, name);  // first, as two are too large for one
+  CheckOneHead(head, name);  // before CheckHeadMesh, which would call two heads too large
   OuterHead outer{.skin = {}, .points = {}, .notes = CheckHeadMesh(head, name)};
   std::ranges::copy(landmarks.notes, std::back_inserter(outer.notes));
   CheckEnough(landmarks.points, name);
   CheckPlace(landmarks.points, name);
   context.Report("skin", "what is seen from outside");
   outer.skin = Submesh(head, SeenFromOutside(head, context.threads));
-  outer.points = OnSkin(landmarks.points, outer.skin, name);
+  outer.points = MoveToSkin(landmarks.points, outer.skin, name);
   return outer;
 }
 
 TemplateFace WarpedGenericHead(const OuterHead& head, int max_level) {
   TemplateFace face = GenericHead(max_level);
-  const Correspondence pairs(head.points);
+  const LandmarkPairs pairs(head.points);
   const Similarity head_from_generic = pairs.HeadFromGeneric();
   std::vector<Vec3> placed;
   for (const Vec3& p : pairs.generic) {

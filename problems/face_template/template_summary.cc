@@ -44,14 +44,14 @@ Json ToJson(const TemplateSite& site) {
           {"error_mm", Number(site.error_mm)}};
 }
 
-std::string InWords(const SkinDistance& d) {
+std::string DescribeDistance(const SkinDistance& d) {
   return fmt::format(
       "RMS {:.3f} mm, p95 {:.3f} mm, largest {:.2f} mm; measured on {:.1f} % of "
       "{:.0f} cm²",
       d.rms_mm, d.p95_mm, d.max_mm, 100 * d.covered, d.area_mm2 / 100);
 }
 
-std::string SitesInWords(const TemplateFit& fit) {
+std::string DescribeSites(const TemplateFit& fit) {
   double worst = 0, drift = 0;
   std::string worst_code = "none", drift_code = "none";
   int landmarks = 0;
@@ -76,8 +76,8 @@ std::string SitesInWords(const TemplateFit& fit) {
 // The picture
 // ---------------------------------------------------------------------------------------------
 
-constexpr double kDot_mm = 1.4;
-constexpr double kColoured_mm = 1;  // largest distance that has a colour of its own
+constexpr double kDot_mm = 1.4;     // radius of the dots at the sites
+constexpr double kColoured_mm = 1;  // larger distances have the colour of this one
 
 SceneObject SiteDots(const TemplateFit& fit) {
   SceneObject dots{.mesh = {}, .material = PlasticMaterial(HexColour(0xc8321f))};
@@ -123,11 +123,11 @@ std::string TemplateText(const TemplateFit& fit, const TemplateFitOptions& optio
   std::string text;
   for (const TemplateLevel& level : fit.levels) {
     text += fmt::format("level {}: {} vertices; {}\n", level.level, level.vertices,
-                        InWords(level.face_to_skin));
+                        DescribeDistance(level.face_to_skin));
   }
-  text += fmt::format("face to skin: {}\nskin to face: {}\n", InWords(fit.face_to_skin),
-                      InWords(fit.skin_to_face));
-  text += SitesInWords(fit);
+  text += fmt::format("face to skin: {}\nskin to face: {}\n", DescribeDistance(fit.face_to_skin),
+                      DescribeDistance(fit.skin_to_face));
+  text += DescribeSites(fit);
   text += fmt::format("folds: {}\ntolerance of {} mm: {}\n", fit.folds, options.tolerance_mm,
                       fit.met ? "met" : "not met; finer levels, or a finer mesh, come closer");
   return text + fmt::format(

@@ -16,9 +16,9 @@
 #include "problems/inputs/input_files.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/pipeline/case.h"
+#include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/extra_dowels.h"
 #include "problems/pipeline/make_face.h"
-#include "problems/pipeline/stage_key.h"
 #include "problems/prior/feature_rules.h"
 #include "problems/subject/network_file.h"
 #include "problems/subject/sites.h"
@@ -134,14 +134,14 @@ void LookAtMap(const DepthMap& map) {
 }
 
 // Notes on rules that do not apply, as a run tells them.
-Lines NotesOnRules(const Experiment& experiment, const Case& subject, StageCache& loaded,
-                   const RunContext& context) {
+Lines ExplainUnusedRules(const Experiment& experiment, const Case& subject, StageCache& loaded,
+                         const RunContext& context) {
   std::shared_ptr<const LoadedPrior> prior;
   if (AsksPrior(WayToFace(experiment))) {
     prior = GivenPrior(experiment, LoadTemplate(experiment.face_template), loaded, context);
   }
-  return NotesOnRules(experiment.rules, subject.points, subject.basis.sites.has_value(),
-                      prior ? &prior->face : nullptr);
+  return ExplainUnusedRules(experiment.rules, subject.points, subject.basis.sites.has_value(),
+                            prior ? &prior->face : nullptr);
 }
 
 bool NamesAFile(const Experiment& experiment) {
@@ -236,7 +236,7 @@ CheckFindings InputCheck::LookAtFace(const Experiment& experiment) {
 
 CheckFindings InputCheck::LookAtCase(const Experiment& experiment) {
   if (IsMade(experiment) && UsesAllLandmarks(experiment) && experiment.sites.empty() &&
-      experiment.rules.points.empty() && !AsksForRule(experiment.rules)) {
+      experiment.rules.points.empty() && !RequestsRule(experiment.rules)) {
     return {};  // its landmarks lie on its bone
   }
   const std::string key =
@@ -252,7 +252,7 @@ CheckFindings InputCheck::LookAtCase(const Experiment& experiment) {
     }
     const Case made = MakeCase(*subject, experiment);
     CheckFaceOptions(experiment, made);
-    for (const std::string& note : NotesOnRules(experiment, made, loaded_, context_)) {
+    for (const std::string& note : ExplainUnusedRules(experiment, made, loaded_, context_)) {
       AddNew(note, found.warnings);
     }
   });

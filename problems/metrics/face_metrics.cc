@@ -2,8 +2,10 @@
 #include "problems/metrics/face_metrics.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
+#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "surfaces/base/parallel.h"
@@ -11,6 +13,79 @@
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
+namespace {
+
+struct Corner {
+  Vec3 point, move;
+  double signed_mm;
+};
+
+double Swept_mm3(const Corner& a, const Corner& b, const Corner& c) {
+  const Vec3 e1 = b.point - a.point, e2 = c.point - a.point;
+  const Vec3 f1 = b.move - a.move, f2 = c.move - a.move;
+  const Vec3 twice_area = e1.cross(e2) + (e1.cross(f2) + f1.cross(e2)) / 2 + f1.cross(f2) / 3;
+  return ((a.move + b.move + c.move) / 3).dot(twice_area) / 2;
+}
+
+// The point between corners of opposite sign at which the distance is 0, so that the surfaces meet.
+Corner Crossing(const Corner& a, const Corner& b) {
+  const double s = a.signed_mm / (a.signed_mm - b.signed_mm);
+  return {a.point + s * (b.point - a.point), a.move + s * (b.move - a.move), 0};
+}
+
+void Add(double swept_mm3, bool outside, EnclosedVolume& volume) {
+  (outside ? volume.outside_cm3 : volume.inside_cm3) += (outside ? 1 : -1) * swept_mm3 / 1000;
+}
+
+EnclosedVolume SweptByTriangle(const std::array<Corner, 3>& t) {
+  EnclosedVolume volume;
+  const auto outside = [&](int k) { return t[k].signed_mm > 0; };
+  int alone = 0;  // the corner with a sign of its own; 3 if all signs are equal
+  while (alone < 3 && (outside(alone) == outside((alone + 1) % 3) ||
+                       outside(alone) == outside((alone + 2) % 3))) {
+    ++alone;
+  }
+  if (alone == 3) {
+    Add(Swept_mm3(t[0], t[1], t[2]), outside(0), volume);
+    return volume;
+  }
+  const Corner &a = t[alone], &b = t[(alone + 1) % 3], &c = t[(alone + 2) % 3];
+  const Corner ab = Crossing(a, b), ac = Crossing(a, c);
+  Add(Swept_mm3(a, ab, ac), outside(alone), volume);
+  Add(Swept_mm3(ab, b, c) + Swept_mm3(ab, c, ac), !outside(alone), volume);
+  return volume;
+}
+
+void Accumulate(const EnclosedVolume& more, double share, EnclosedVolume& sum) {
+  sum.outside_cm3 += share * more.outside_cm3;
+  sum.inside_cm3 += share * more.inside_cm3;
+}
+
+}  // namespace
+
+VolumeByPart MeasureEnclosed(const TriMesh& mesh, std::span<const Vec3> move,
+                             std::span<const double> signed_mm, std::span<const int> part) {
+  VolumeByPart volume;
+  for (const Triangle& t : mesh.triangles) {
+    std::array<Corner, 3> corners;
+    bool known = true;
+    for (int k = 0; k < 3; ++k) {
+      corners[k] = {mesh.points[t[k]], move[t[k]], signed_mm[t[k]]};
+      known = known && std::isfinite(signed_mm[t[k]]);
+    }
+    if (known) {
+      const EnclosedVolume swept = SweptByTriangle(corners);
+      Accumulate(swept, 1, volume.all);
+      for (const auto v : t) {
+        if (part[v] >= 0) {
+          Accumulate(swept, 1.0 / 3, volume.parts[part[v]]);
+        }
+      }
+    }
+  }
+  return volume;
+}
+
 namespace {
 
 struct Sample {
@@ -71,11 +146,11 @@ std::vector<double> Quantiles(const std::vector<Sample>& samples) {
   return quantiles;
 }
 
-// The nearest points of a mesh to the wanted ones of another's vertices.
+// The points of a mesh that are nearest to chosen vertices of another mesh.
 struct Nearest {
-  std::vector<MeshPoint> points;  // one per vertex; as constructed where not wanted
-  std::vector<double> signed_mm;  // positive where the mesh lies on the outer side of the vertex's
-                                  // normal; NaN where not wanted
+  std::vector<MeshPoint> points;  // one per vertex; without a triangle if the vertex is not chosen
+  // Positive if the mesh lies on the outer side of the vertex's normal; NaN if it is not chosen.
+  std::vector<double> signed_mm;
 };
 
 Nearest FindNearest(const TriMesh& from, const std::vector<Vec3>& normals,
@@ -153,7 +228,7 @@ std::vector<bool> FaceOverScoredSkin(const TriMesh& outer, const FaceRegion& reg
   return {over.begin(), over.end()};
 }
 
-// Both with half of the weight; of one alone where the other has no area.
+// Joins both sets with half of the weight each. If one has no area, the other one has all weight.
 std::vector<Sample> EvenlyWeighted(std::vector<Sample> a, const std::vector<Sample>& b) {
   const auto area = [](const std::vector<Sample>& samples) {
     double sum = 0;
@@ -175,7 +250,7 @@ void CheckScored(const FaceRegion& region) {
   if (std::find(region.scored.begin(), region.scored.end(), true) == region.scored.end()) {
     throw InputError(
         "face metrics: no vertex of the true skin is scored; check that skull and skin share a "
-        "frame, and what of the skin `region` asks for (extent, reach_mm, exclude)");
+        "frame, and the part of the skin that `region` selects (extent, reach_mm, exclude)");
   }
 }
 
@@ -223,10 +298,6 @@ std::map<std::string, DistanceSummary> SummarizeParts(const std::vector<double>&
   return parts;
 }
 
-FaceRegion WholeSurface(const TriMesh& truth) {
-  return {std::vector<bool>(truth.points.size(), true), std::vector<int>(truth.points.size(), -1)};
-}
-
 FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                          const RunContext& context) {
   CheckScored(region);
@@ -249,7 +320,8 @@ FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const T
     metrics.region_volumes[kFaceParts[part]] = enclosed;
   }
   const std::vector<bool> over = FaceOverScoredSkin(outer, region, outer_query, face, context);
-  // Seen from the face, the truth lies outside where the face lies inside: the sign turns.
+  // These distances are seen from the face. The truth lies outside the face if the face lies inside
+  // the truth, so the sign turns.
   std::vector<double> back =
       FindNearest(face, VertexNormals(face), over, outer_query, context).signed_mm;
   std::transform(back.begin(), back.end(), back.begin(), [](double d) { return -d; });
@@ -261,6 +333,57 @@ FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const T
       metrics.truth_to_face.mean_abs_mm * metrics.truth_to_face.area_cm2 / 10;
   metrics.signed_mm = forth.signed_mm;
   return metrics;
+}
+
+using Json = nlohmann::ordered_json;  // writes NaN as null
+
+Json SummaryToJson(const DistanceSummary& s) {
+  return {{"mean_abs_mm", s.mean_abs_mm},
+          {"rms_mm", s.rms_mm},
+          {"median_mm", s.median_mm},
+          {"p95_mm", s.p95_mm},
+          {"max_mm", s.max_mm},
+          {"mean_signed_mm", s.mean_signed_mm},
+          {"sd_mm", s.sd_mm},
+          {"within_2_5mm", s.within_2_5mm},
+          {"within_5mm", s.within_5mm},
+          {"area_cm2", s.area_cm2}};
+}
+
+namespace {
+
+void AddVolume(const EnclosedVolume& volume, Json& json) {
+  json["enclosed_volume_cm3"] = volume.Enclosed();
+  json["outside_volume_cm3"] = volume.outside_cm3;
+  json["inside_volume_cm3"] = volume.inside_cm3;
+}
+
+Json RegionsToJson(const FaceMetrics& metrics) {
+  Json json = Json::object();
+  for (const auto& [name, summary] : metrics.regions) {
+    json[name] = SummaryToJson(summary);
+    const auto volume = metrics.region_volumes.find(name);
+    AddVolume(volume == metrics.region_volumes.end() ? EnclosedVolume{} : volume->second,
+              json[name]);
+  }
+  return json;
+}
+
+}  // namespace
+
+Json MetricsToJson(const FaceMetrics& metrics) {
+  Json json = SummaryToJson(metrics.truth_to_face);
+  json["hausdorff_mm"] = metrics.hausdorff_mm;
+  json["volume_between_cm3"] = metrics.volume_between_cm3;
+  AddVolume(metrics.volume, json);
+  json["normals"] = {{"mean_deg", metrics.normals.mean_deg},
+                     {"median_deg", metrics.normals.median_deg},
+                     {"p95_deg", metrics.normals.p95_deg}};
+  json["quantiles_mm"] = metrics.quantiles_mm;
+  json["reverse"] = SummaryToJson(metrics.face_to_truth);
+  json["symmetric"] = SummaryToJson(metrics.symmetric);
+  json["regions"] = RegionsToJson(metrics);
+  return json;
 }
 
 }  // namespace semblance

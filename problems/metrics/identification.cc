@@ -20,7 +20,7 @@ double OrLargest(double distance_mm) {
   return std::isfinite(distance_mm) ? distance_mm : std::numeric_limits<double>::infinity();
 }
 
-// The points that both have, in the same order.
+// The points that both faces have, in the same order.
 struct CommonPoints {
   std::vector<Vec3> of_probe, of_known;
 };

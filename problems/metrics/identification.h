@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether a face is recognised: the rank of the right person in a gallery.
+// Measures whether a face is recognised: the rank of the right person in a gallery.
 #pragma once
 
 #include <cstdint>
@@ -14,13 +14,14 @@
 
 namespace semblance {
 
-// The place of `own` when the gallery is sorted by its distances: 1 + those that are closer + half
-// of the others that are as close, so that a gallery of equals gives the mean rank. A distance that
-// is not finite counts as the largest. distances_mm: one per person; own: an index of it.
+// The place of `own` in the gallery sorted by distance: 1 + the number of closer persons + half of
+// the number of equally close ones, so that a gallery of equals gives the mean rank. A distance
+// that is not finite counts as the largest. distances_mm: one per person; own: an index of it.
 double RankOf(std::span<const double> distances_mm, std::size_t own);
 
-// The cumulative match characteristic (Phillips et al. 2000): at [k - 1] the share of ranks that do
-// not exceed k, for k = 1 ... gallery. Ranks are in 1 ... gallery, so the last is 1; none: all NaN.
+// The cumulative match characteristic (Phillips et al. 2000): entry [k - 1] is the share of ranks
+// that do not exceed k, for k = 1 ... gallery. Ranks lie in 1 ... gallery, so the last entry is 1.
+// All NaN without ranks.
 std::vector<double> CumulativeMatch(std::span<const double> ranks, int gallery);
 
 // The mean rank by chance.
@@ -29,7 +30,7 @@ inline double ChanceRank(int gallery) { return (gallery + 1) / 2.0; }
 // Points of the skin in front of landmarks.
 using SkinPoints = std::vector<std::pair<std::string, Vec3>>;  // by site
 
-// A face that is asked about.
+// The face of an unknown person.
 struct ProbeFace {
   TriMesh mesh;
   SkinPoints points;
@@ -39,22 +40,23 @@ struct ProbeFace {
 struct KnownFace {
   std::string name;
   TriMesh skin;
-  FaceRegion region;  // of the skin: what is compared
+  FaceRegion region;  // the part of the skin that is compared
   SkinPoints points;
 };
 
 struct FaceDistance {
-  double surface_mm = kNaN;    // rms over the region, after the rigid motion that lies best
-  double landmarks_mm = kNaN;  // rms of the points that both have, after a rigid motion of them
+  double surface_mm = kNaN;    // rms over the region, after the best rigid motion of the surface
+  double landmarks_mm = kNaN;  // rms over the common points, after their best rigid motion
 };
 
-// Size is kept: it tells people apart. The surface is first brought to the person by the points,
-// then by ScoreBestFit (protocols.h). Throws InputError if the two have fewer than three points in
-// common, or nothing of the skin is scored.
+// The motion keeps the size, because size distinguishes people. The surface is placed by the
+// points, then by ScoreBestFit (protocols.h). Throws InputError if the two faces have fewer than
+// three common points or if no skin is scored.
 FaceDistance DistanceOf(const ProbeFace& probe, const KnownFace& known, const RunContext& context);
 
-// The true face as another scan would show it: vertices clustered in cells of cell_mm (> 0), then
-// each moved at random along its normal, noise_mm (>= 0) rms. The points move likewise.
+// Simulates another scan of the true face. Vertices are clustered in cells of cell_mm (> 0). Then
+// each vertex moves at random along its normal, by noise_mm (>= 0) rms. The points move at random
+// in all directions, by noise_mm rms.
 ProbeFace SeenAgain(const KnownFace& known, double cell_mm, double noise_mm,
                     std::uint64_t random_seed);
 

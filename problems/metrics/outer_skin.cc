@@ -16,7 +16,7 @@ namespace {
 
 using Cell = std::array<int, 3>;
 
-// Where the ball's centre may be: cells of a box, by their middles.
+// The places that the ball's centre can reach: cells of a box, represented by their middles.
 class ProbeGrid {
  public:
   ProbeGrid(const Box3& box, double probe_mm, const std::vector<CutPlane>& ends)
@@ -34,7 +34,7 @@ class ProbeGrid {
     }
   }
 
-  // No centre comes nearer to p than the ball's radius.
+  // Bars all centres that are nearer to p than the ball's radius.
   void KeepOff(const Vec3& p) {
     ForRowsWithin(p, probe_mm_, [&](std::size_t first, std::size_t last, const Vec3&) {
       std::fill(state_.begin() + std::ptrdiff_t(first), state_.begin() + std::ptrdiff_t(last) + 1,
@@ -43,7 +43,7 @@ class ProbeGrid {
     });
   }
 
-  // The ball comes from all faces of the box that are free.
+  // Moves the ball in from all free faces of the box.
   void Flood() {
     std::vector<Cell> open;
     ForFaces([&](const Cell& c) { Enter(c, open); });
@@ -62,7 +62,7 @@ class ProbeGrid {
     }
   }
 
-  // Whether the ball has come to touch p from the side that the normal shows to.
+  // True if the ball reached a place in which it touches p on the outer side of the normal.
   bool Touches(const Vec3& p, const Vec3& normal) const {
     const double reach_mm = probe_mm_ + std::numbers::sqrt3 * cell_mm_;
     return ForRowsWithin(
@@ -103,7 +103,7 @@ class ProbeGrid {
     });
   }
 
-  // Calls visit(cell) from first to last, x fastest; ends as soon as it returns true, and says so.
+  // Calls visit(cell) from first to last, x fastest, until it returns true. Returns whether it did.
   template <class Visit>
   static bool ForCells(const Cell& first, const Cell& last, const Visit& visit) {
     for (int z = first[2]; z <= last[2]; ++z) {
@@ -117,8 +117,8 @@ class ProbeGrid {
     }
     return false;
   }
-  // Calls visit(first, last, middle of first - p) for each row along x of the cells whose middles
-  // are closer to p than radius_mm; ends as soon as it returns true, and says so.
+  // Calls visit(first, last, middle of first - p) for each row along x of cells whose middles are
+  // closer to p than radius_mm, until it returns true. Returns whether it did.
   template <class Visit>
   bool ForRowsWithin(const Vec3& p, double radius_mm, const Visit& visit) const {
     const Vec3 at = (p - origin_) / cell_mm_ - Vec3::Constant(0.5);  // in cells, of middles
@@ -161,8 +161,8 @@ class ProbeGrid {
   std::vector<std::uint8_t> state_;
 };
 
-// Points of the mesh, such that none of its surface is further than about half of spacing_mm from
-// one: all corners, and more on triangles that are larger.
+// Visits points of the mesh: all corners, and more on large triangles. Every place of the surface
+// lies within about half of spacing_mm of one of them.
 template <class Visit>
 void ForPointsOn(const TriMesh& mesh, double spacing_mm, const Visit& visit) {
   std::ranges::for_each(mesh.points, visit);
@@ -178,7 +178,7 @@ void ForPointsOn(const TriMesh& mesh, double spacing_mm, const Visit& visit) {
   }
 }
 
-std::vector<CutPlane> EndsOf(const TriMesh& skin) {
+std::vector<CutPlane> FindEnds(const TriMesh& skin) {
   std::vector<CutPlane> ends = FindCutPlanes(skin);
   const std::vector<CutPlane> lids = FindLids(skin);
   ends.insert(ends.end(), lids.begin(), lids.end());
@@ -186,9 +186,9 @@ std::vector<CutPlane> EndsOf(const TriMesh& skin) {
 }
 
 void CheckSize(const TriMesh& skin, double probe_mm) {
-  constexpr double kMostProbes = 1000;
+  constexpr double kLargestSize_probes = 1000;  // bounds the grid's memory
   const double size_mm = Bounds(skin).sizes().maxCoeff();
-  if (skin.triangles.empty() || !(size_mm <= kMostProbes * probe_mm)) {
+  if (skin.triangles.empty() || !(size_mm <= kLargestSize_probes * probe_mm)) {
     throw InputError(
         fmt::format("outer skin: a mesh of {} triangles, {:.4g} mm long, cannot be felt with a "
                     "probe of {} mm; give a head in mm, or a larger probe_mm",
@@ -200,7 +200,7 @@ void CheckSize(const TriMesh& skin, double probe_mm) {
 
 OuterSkin FindOuterSkin(const TriMesh& skin, double probe_mm) {
   CheckSize(skin, probe_mm);
-  OuterSkin result{std::vector<bool>(skin.points.size(), false), EndsOf(skin)};
+  OuterSkin result{std::vector<bool>(skin.points.size(), false), FindEnds(skin)};
   ProbeGrid grid(Bounds(skin), probe_mm, result.ends);
   ForPointsOn(skin, probe_mm / 3, [&](const Vec3& p) { grid.KeepOff(p); });
   grid.Flood();

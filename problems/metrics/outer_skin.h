@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which of a scanned skin faces the outside air. A surface between tissue and air, as it is taken
-// from a scan, also has the walls of airways and sinuses, and where the scan ended a lid or a rim.
+// Finds the part of a scanned skin that faces the outside air. A surface between tissue and air
+// that was taken from a scan also has the walls of airways and sinuses, and a lid or a rim where
+// the scan ended.
 #pragma once
 
 #include <vector>
@@ -12,16 +13,16 @@ namespace semblance {
 
 struct OuterSkin {
   std::vector<bool> outer;     // one per vertex
-  std::vector<CutPlane> ends;  // sides of the bounding box that the scan was cut off at
+  std::vector<CutPlane> ends;  // sides of the bounding box at which the scan was cut off
 };
 
-// A vertex is outer if a ball of probe_mm radius that comes from outside can touch it there, on the
-// outer side of its normal: what the ball does not get into (nostrils, ears' canals, a mouth that
-// is closed) is inside. Found by moving the ball's centre on a grid, so the radius is met within
-// sqrt(3) cells of probe_mm / 6. A side of the bounding box is an end of the scan if an open border
-// runs along it (FindCutPlanes) or a lid closes it (FindLids); the ball comes from none of them, so
-// a lid is not outer, nor is an airway that a cut opens. Triangles face outwards. Throws InputError
-// if the mesh has no triangle, is not finite, or is more than 1000 probes long.
+// A vertex is outer if a ball of radius probe_mm that comes from outside can touch it on the outer
+// side of its normal. Cavities that the ball cannot enter (nostrils, ear canals, a closed mouth)
+// are inside. The centre of the ball moves on a grid with cells of probe_mm / 6, so the radius is
+// exact to sqrt(3) cells. A side of the bounding box is an end of the scan if an open border runs
+// along it (FindCutPlanes) or a lid closes it (FindLids). The ball comes from no end. So neither a
+// lid nor an airway that a cut opens is outer. Triangles face outwards. Throws InputError if the
+// mesh has no triangle, is not finite, or is more than 1000 probes long.
 OuterSkin FindOuterSkin(const TriMesh& skin, double probe_mm);
 
 }  // namespace semblance

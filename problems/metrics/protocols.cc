@@ -22,10 +22,10 @@ struct Sampled {
 };
 
 Sampled TakeEvenly(const TriMesh& truth, const std::vector<bool>& scored) {
-  constexpr std::size_t kMost = 4000;
+  constexpr std::size_t kMostSamples = 4000;  // more cost time and hardly move the minimum
   const std::vector<double> areas = VertexAreas(truth);
   const std::size_t count = std::count(scored.begin(), scored.end(), true);
-  const std::size_t stride = (count + kMost - 1) / kMost;
+  const std::size_t stride = (count + kMostSamples - 1) / kMostSamples;
   Sampled sampled;
   double sum = 0;
   for (std::size_t v = 0, n = 0; v < scored.size(); ++v) {
@@ -48,7 +48,7 @@ Similarity Inverse(const Similarity& rigid) {
   return {1, back, -(back * rigid.translation)};
 }
 
-// Motion after `pose`, about the middle in the frame that pose leads to.
+// `pose`, followed by a motion about `middle`, a point in the target frame of the pose.
 Similarity Moved(const Similarity& pose, const Motion& motion, const Vec3& middle) {
   const Vec3 turn = motion.head<3>();
   const double angle = turn.norm();
@@ -58,7 +58,7 @@ Similarity Moved(const Similarity& pose, const Motion& motion, const Vec3& middl
           rotation * (pose.translation - middle) + middle + Vec3(motion.tail<3>())};
 }
 
-// The cost of a pose of the truth in the face's frame, and its quadratic model.
+// The cost of a pose of the truth in the face's frame, and its quadratic model there.
 struct Linearized {
   double cost = 0;  // mean squared distance, mm^2
   Motion gradient = Motion::Zero();
@@ -95,8 +95,8 @@ struct Alignment {
 };
 
 Alignment Align(const Sampled& sampled, const MeshQuery& face, const RunContext& context) {
-  constexpr int kMostSteps = 60;
-  constexpr double kAtRest = 1e-7;  // of the cost
+  constexpr int kMostSteps = 60;    // bounds the time of a search that does not converge
+  constexpr double kAtRest = 1e-7;  // a smaller relative decrease of the cost ends the search
   Alignment result;
   Linearized model = Linearize(sampled, result.face_from_truth, face, context);
   double damping = 1e-4;
@@ -123,8 +123,8 @@ Alignment Align(const Sampled& sampled, const MeshQuery& face, const RunContext&
   return result;
 }
 
-// Where the ray to the viewer leaves a mesh for the last time: its distance from p towards the
-// viewer, NaN if there is none within reach.
+// The distance from p towards the viewer of the last point at which that ray leaves a mesh. NaN if
+// there is none within reach.
 double FrontHit(const MeshQuery& mesh, const Vec3& p, const Vec3& to_front, double reach_mm) {
   const auto hit = mesh.FirstHit(p + reach_mm * to_front, -to_front, 2 * reach_mm);
   return hit ? reach_mm - hit->distance_mm : kNaN;
@@ -151,7 +151,9 @@ BestFitScore ScoreBestFit(const TriMesh& truth, const FaceRegion& region, const 
 
 ViewRayScore ScoreAlongView(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                             const Vec3& to_front, const RunContext& context) {
-  constexpr double kReach_mm = 400, kSelf_mm = 0.1, kLeastCosine = 0.2588;  // 75 degrees
+  constexpr double kReach_mm = 400;        // longer than a head
+  constexpr double kSelf_mm = 0.1;         // a first hit within this of the vertex is the vertex
+  constexpr double kLeastCosine = 0.2588;  // of 75 degrees
   const MeshQuery truth_query(truth), face_query(face);
   const std::vector<Vec3> normals = VertexNormals(truth);
   const std::vector<double> areas = VertexAreas(truth);

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The same face scored as other papers score theirs, so that figures can be set side by side. Ours,
-// in the frame of the scan without any alignment, is the strictest (face_metrics.h).
+// Scores a face by the protocols of other papers, so that figures can be compared. Our own protocol
+// (face_metrics.h) measures in the frame of the scan without any alignment, and is the strictest.
 #pragma once
 
 #include "problems/metrics/face_metrics.h"
 
 namespace semblance {
 
-// After the rigid motion of the face that lies best on the scored skin (Lee et al. 2012, Miranda et
-// al. 2018): it hides an error of pose.
+// The score after the rigid motion that brings the face closest to the scored skin (Lee et al.
+// 2012, Miranda et al. 2018). It hides an error of pose.
 struct BestFitScore {
   DistanceSummary truth_to_face;
   Similarity aligned_from_face;  // scale 1
@@ -18,16 +18,17 @@ struct BestFitScore {
   bool converged = false;
 };
 
-// Along rays from the front (Hu et al. 2021), of the scored skin that is seen from there and does
-// not stand steeper than 75 degrees to the view, weighted by the area in the picture.
+// The score along rays from the front (Hu et al. 2021), weighted by the area in the picture. It
+// covers the scored skin that is seen from there, except skin that is steeper than 75 degrees to
+// the view.
 struct ViewRayScore {
   DistanceSummary along_ray;  // > 0: the face is nearer to the viewer
-  double missed_cm2 = kNaN;   // of scored skin that is seen, where the ray misses the face
+  double missed_cm2 = kNaN;   // area of such skin whose ray misses the face
 };
 
-// Minimises the squared closest-point distance, by area, over up to 4000 evenly taken vertices
-// (Levenberg-Marquardt on the distance itself, which makes it ICP's minimum without its many
-// steps). The distances told are of all vertices. Throws as CompareFaces.
+// Minimises the mean squared distance to the closest points, by area, over up to 4000 evenly taken
+// vertices. Levenberg-Marquardt on the distance itself finds the minimum of ICP without its many
+// steps. The reported distances are over all vertices. Throws as CompareFaces does.
 BestFitScore ScoreBestFit(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                           const RunContext& context);
 

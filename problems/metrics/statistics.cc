@@ -19,7 +19,7 @@ namespace {
 
 double Rounded(double x) { return std::round(x * 1e9) / 1e9; }
 
-double MeanOf(std::span<const double> values) {
+double Mean(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
 }
 
@@ -41,7 +41,7 @@ Interval BootstrapMean(std::span<const double> values, std::uint64_t random_seed
 // Mean ranks from 1, smallest first.
 struct Ranks {
   std::vector<double> rank;
-  double tie_term = 0;  // sum over groups of equals of t^3 - t
+  double tie_term = 0;  // sum of t^3 - t over groups of t equal values
 };
 Ranks RankAll(const std::vector<double>& values) {
   std::vector<std::size_t> order(values.size());
@@ -87,7 +87,8 @@ double NormalWilcoxonP(int n, double w, double tie_term) {
   return std::min(1.0, 2 * boost::math::cdf(boost::math::complement(boost::math::normal(), z)));
 }
 
-// Upper 5 % of the studentized range for 2..20 treatments and no end of freedom, over sqrt 2.
+// The upper 5 % quantile of the studentized range for 2 to 20 treatments and infinite degrees of
+// freedom, divided by sqrt 2.
 double NemenyiQ(int treatments) {
   constexpr std::array<double, 19> kQ = {1.960, 2.343, 2.569, 2.728, 2.850, 2.949, 3.031,
                                          3.102, 3.164, 3.219, 3.268, 3.313, 3.354, 3.391,
@@ -117,7 +118,7 @@ SampleSummary Summarize(std::span<const double> values, std::uint64_t random_see
   }
   std::vector<double> sorted(values.begin(), values.end());
   std::sort(sorted.begin(), sorted.end());
-  s.mean = MeanOf(sorted);
+  s.mean = Mean(sorted);
   const std::vector<WeightedValue> alike = SortedValues(sorted);
   s.median = Quantile(alike, 0.5);
   s.quartile_1 = Quantile(alike, 0.25);

@@ -40,8 +40,8 @@ TriMesh ReadHeadMesh(const FileSubject& options, const std::filesystem::path& pa
   return mesh;
 }
 
-LandmarkFile LandmarksOf(const std::filesystem::path& path, Landmarking landmarking,
-                         SubjectData& subject) {
+LandmarkFile ReadSubjectLandmarks(const std::filesystem::path& path, Landmarking landmarking,
+                                  SubjectData& subject) {
   if (path.empty() && landmarking == Landmarking::kOpen) {
     return {};
   }
@@ -73,7 +73,7 @@ void Mirror(const MirrorOptions& options, LandmarkFile& landmarks, SubjectData& 
 
 LandmarkFile Load(const FileSubject& options, Landmarking landmarking, SubjectData& subject,
                   const RunContext& context) {
-  LandmarkFile landmarks = LandmarksOf(options.landmarks, landmarking, subject);
+  LandmarkFile landmarks = ReadSubjectLandmarks(options.landmarks, landmarking, subject);
   subject.skull = ReadHeadMesh(options, options.skull, "skull", subject);
   if (!options.skin.empty()) {
     subject.skin = ReadHeadMesh(options, options.skin, "skin", subject);
@@ -94,7 +94,7 @@ LandmarkFile Load(const CtSubject& options, Landmarking landmarking, SubjectData
         "subject.volume: no file is named; give a folder of DICOM files, or a volume as .nii, "
         ".nrrd, .mha or .inv3");
   }
-  LandmarkFile landmarks = LandmarksOf(options.landmarks, landmarking, subject);
+  LandmarkFile landmarks = ReadSubjectLandmarks(options.landmarks, landmarking, subject);
   const VolumeReading reading = ReadVolume(options.volume, options.read, context);
   if (reading.modality == Modality::kMr) {
     throw InputError(fmt::format(
@@ -113,7 +113,7 @@ LandmarkFile Load(const CtSubject& options, Landmarking landmarking, SubjectData
   return landmarks;
 }
 
-// One line for all areas, by the sites that they lack.
+// Adds one note for all dropped areas, with the sites that they lack.
 void NoteDroppedAreas(Case& subject) {
   const DowelNetwork& network = subject.network;
   if (!network.dropped.empty()) {
@@ -123,14 +123,14 @@ void NoteDroppedAreas(Case& subject) {
   }
 }
 
-// The landmarks where they were given, before they are laid onto bone: a skin is scored alike with
-// and without its skull at hand.
-std::vector<Dowel> AsGiven(const LandmarkFile& file, std::vector<Dowel> dowels_on_bone) {
-  for (Dowel& dowel : dowels_on_bone) {
-    const auto landmark = std::ranges::find(file.landmarks, dowel.site, &Landmark::site);
-    dowel.base = {landmark->point[0], landmark->point[1], landmark->point[2]};
+// The dowels at their landmarks as given, before these were laid onto bone. So a skin is scored in
+// the same way with and without its skull.
+std::vector<Dowel> DowelsAsGiven(const Case& subject) {
+  std::vector<Dowel> dowels = subject.dowels_on_bone;
+  for (Dowel& dowel : dowels) {
+    dowel.base = subject.points.at(dowel.site);
   }
-  return dowels_on_bone;
+  return dowels;
 }
 
 std::vector<std::string> CheckLandmarks(const SubjectData& data, const MeshQuery& skull,
@@ -142,7 +142,7 @@ std::vector<std::string> CheckLandmarks(const SubjectData& data, const MeshQuery
   return found.notes;
 }
 
-// What tells the depths that are to be expected, where the scheme asks for them.
+// The source of the expected depths, if the scheme needs them.
 std::optional<TissueOptions> ExpectedTissue(const Experiment& experiment) {
   if (!NeedsExpected(experiment.interp)) {
     return std::nullopt;
@@ -154,7 +154,7 @@ std::optional<TissueOptions> ExpectedTissue(const Experiment& experiment) {
   return table;
 }
 
-// The table's mean depths at all dowels that it has one for, measured or not.
+// The table's mean depths at all dowels for which it has one, measured or not.
 std::vector<Dowel> ExpectedDowels(const Experiment& experiment, const LandmarkFile& landmarks,
                                   std::vector<Dowel> dowels) {
   const std::optional<TissueOptions> table = ExpectedTissue(experiment);
@@ -169,7 +169,9 @@ bool UsesAllAsGiven(const PlaceOptions& options) {
   return std::holds_alternative<KeepAll>(options.keep) && options.noise_mm == 0;
 }
 
-// The dowels of the landmarks that the experiment uses, in place of all. Returns notes.
+// Replaces the dowels by those of the landmarks that the experiment uses, with noise if it wants
+// some. Their depths are filled again, because notes and faults must concern the used landmarks
+// alone. Returns notes.
 std::vector<std::string> UseSome(const SubjectData& data, const PlaceOptions& options,
                                  const TissueOptions& tissue, const MeshQuery& skull,
                                  Case& subject) {
@@ -179,7 +181,7 @@ std::vector<std::string> UseSome(const SubjectData& data, const PlaceOptions& op
   return used.notes;
 }
 
-// The network's plan, closed over the landmarks that the experiment does not use.
+// The network's plan without the landmarks that the experiment does not use. The gaps are closed.
 NetworkPlan PlanFor(const Experiment& experiment, const LandmarkFile& landmarks, NetworkPlan plan) {
   if (std::holds_alternative<KeepAll>(experiment.landmarks.keep)) {
     return plan;
@@ -202,8 +204,8 @@ NetworkPlan PlanFor(const Experiment& experiment, const LandmarkFile& landmarks,
   return WithoutSites(std::move(plan), gone, points);
 }
 
-// The subject with its dowels on bone, which have no depth yet.
-Case CaseOf(const SubjectData& data, const Experiment& experiment, const MeshQuery& query) {
+// The subject with dowels on bone that have no depth yet.
+Case StartCase(const SubjectData& data, const Experiment& experiment, const MeshQuery& query) {
   const bool measured = !std::holds_alternative<PhantomOptions>(experiment.subject);
   Case subject{.name = data.landmarks.subject,
                .skull = data.skull,
@@ -229,13 +231,13 @@ Case CaseOf(const SubjectData& data, const Experiment& experiment, const MeshQue
   return subject;
 }
 
-// Before some of the dowels are left out, what all of them say of the subject's axes is kept.
+// Gives the dowels their depths. All dowels, before some are left out, decide what is scored.
 void GiveDepths(const SubjectData& data, const Experiment& experiment, const MeshQuery& query,
                 Case& subject) {
   const TissueOptions tissue = WithSiteDepths(experiment, data.landmarks);
   const std::vector<std::string> on_depths =
       FillDepths(tissue, data.landmarks, subject.dowels_on_bone);
-  subject.basis = BasisOf(AsGiven(data.landmarks, subject.dowels_on_bone));
+  subject.basis = BasisOf(DowelsAsGiven(subject));
   subject.scored_on_bone = subject.dowels_on_bone;
   Append(subject.notes, UsesAllAsGiven(experiment.landmarks)
                             ? on_depths
@@ -254,9 +256,9 @@ void LayNetwork(const NetworkPlan& plan, Case& subject) {
   Append(subject.notes, JoinNetwork(plan, subject.dowels_on_bone, subject.network));
 }
 
-// What is scored rests on all landmarks as they are given, and on the sites that the experiment has
-// in place of a landmark, so that fewer dowels, moved or further ones leave the same bone to
-// compare.
+// The scored network uses all landmarks as given, and the standard sites that the experiment
+// inserts in place of a landmark. So the same bone is compared if dowels are left out, moved or
+// added.
 void LayScoredNetwork(const NetworkPlan& plan, Case& subject) {
   for (const Dowel& dowel : subject.dowels_on_bone) {
     auto& scored = subject.scored_on_bone;
@@ -268,7 +270,7 @@ void LayScoredNetwork(const NetworkPlan& plan, Case& subject) {
   subject.scored_network = BuildNetwork(plan, subject.scored_on_bone);
 }
 
-// A prior's most likely face has its own places for the sites, which no fit moves.
+// A prior's most likely face has its own places for the sites. No fit moves them.
 void AddUnusedUv(const Experiment& experiment, const Case& subject,
                  std::vector<std::string>& mistakes) {
   if (!std::holds_alternative<PriorFace>(WayToFace(experiment))) {
@@ -276,10 +278,11 @@ void AddUnusedUv(const Experiment& experiment, const Case& subject,
   }
   for (const auto& [name, site] : experiment.sites) {
     if (site.uv && subject.points.contains(name)) {
-      mistakes.push_back(fmt::format(
-          "sites.{0}.uv: `face: prior` has a place of its own for the landmark {0} and does not "
-          "look at this one; leave it out, or write `face: prior_then_fit` and `hold: true`",
-          name));
+      mistakes.push_back(
+          fmt::format("sites.{0}.uv: `face: prior` has its own place for the landmark {0} and does "
+                      "not use this "
+                      "one; leave it out, or write `face: prior_then_fit` and `hold: true`",
+                      name));
     }
   }
 }
@@ -326,7 +329,7 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment) {
 
 Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQuery& query) {
   CheckNetworkNamed(experiment);
-  Case subject = CaseOf(data, experiment, query);
+  Case subject = StartCase(data, experiment, query);
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
   GiveDepths(data, experiment, query, subject);
   InsertDowels(experiment, data, query, subject);
@@ -343,8 +346,8 @@ void CheckFaceOptions(const Experiment& experiment, const Case& subject) {
   if (!experiment.rules.points.empty()) {
     const auto& pose = subject.basis.sites;
     Append(mistakes,
-           MistakesOfRulePoints(experiment.rules, MeshQuery(subject.skull),
-                                pose ? &pose->skull_from_average : nullptr, experiment.landmarks));
+           CheckRulePoints(experiment.rules, MeshQuery(subject.skull),
+                           pose ? &pose->skull_from_average : nullptr, experiment.landmarks));
   }
   if (!mistakes.empty()) {
     throw InputError(fmt::format("{}", fmt::join(mistakes, "\n")));
@@ -355,9 +358,9 @@ ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options)
   return FindScoredSkin(subject, FindOuterSkin(*subject.skin, options.probe_mm), options);
 }
 
-ScoredSkin FindScoredSkin(const Case& subject, const OuterSkin& felt,
+ScoredSkin FindScoredSkin(const Case& subject, const OuterSkin& outer,
                           const FaceRegionOptions& options) {
-  return FindScoredSkin(*subject.skin, felt, *subject.basis.sites, subject.scored_on_bone,
+  return FindScoredSkin(*subject.skin, outer, *subject.basis.sites, subject.scored_on_bone,
                         subject.scored_network, options);
 }
 

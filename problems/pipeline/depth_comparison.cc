@@ -12,10 +12,10 @@
 namespace semblance {
 namespace {
 
-// Of the vertices that count.
-DepthScores ScoresWhere(const DepthErrors& errors, const DepthField& depth,
-                        const std::vector<double>& areas_mm2,
-                        const std::function<bool(std::size_t)>& counts) {
+// The scores over the vertices with counts(v).
+DepthScores ScoreWhere(const DepthErrors& errors, const DepthField& depth,
+                       const std::vector<double>& areas_mm2,
+                       const std::function<bool(std::size_t)>& counts) {
   std::vector<double> error_mm = errors.error_mm;
   for (std::size_t v = 0; v < error_mm.size(); ++v) {
     error_mm[v] = counts(v) ? error_mm[v] : kNaN;
@@ -26,12 +26,12 @@ DepthScores ScoresWhere(const DepthErrors& errors, const DepthField& depth,
 void Score(const FaceRegion& region, const DepthField& depth, const std::vector<double>& areas_mm2,
            DepthErrors& errors) {
   errors.scores = ScoreDepths(errors.error_mm, depth.sd_mm, areas_mm2);
-  errors.scheme_scores = ScoresWhere(errors, depth, areas_mm2, [&](std::size_t v) {
+  errors.scheme_scores = ScoreWhere(errors, depth, areas_mm2, [&](std::size_t v) {
     return depth.status[v] == DepthStatus::kAssigned;
   });
   for (const auto& [name, summary] : errors.regions) {
     const auto part = std::ranges::find(kFaceParts, name) - kFaceParts.begin();
-    errors.region_scores[name] = ScoresWhere(errors, depth, areas_mm2, [&](std::size_t v) {
+    errors.region_scores[name] = ScoreWhere(errors, depth, areas_mm2, [&](std::size_t v) {
       return region.part[v] == static_cast<int>(part);
     });
   }
@@ -55,7 +55,8 @@ DepthErrors ErrorsAgainst(const TruthMap& truth, const FaceRegion& region, const
   return errors;
 }
 
-// From the depth's end to the closest skin, where the true depth along the direction is known.
+// Distances from the ends of the depths to the closest skin, where the true depth along the
+// direction is known.
 std::vector<double> TipErrors(const DepthStage& stage, const DepthComparison& comparison,
                               const RunContext& context) {
   const TriMesh& skin = *stage.subject.skin;
@@ -73,7 +74,7 @@ std::vector<double> TipErrors(const DepthStage& stage, const DepthComparison& co
 
 void MakeVariogram(const DepthStage& stage, const std::vector<double>& areas_mm2,
                    DepthComparison& comparison) {
-  constexpr double kBin_mm = 5, kReach_mm = 60;
+  constexpr double kBin_mm = 5, kReach_mm = 60;  // smaller bins are noisier
   std::vector<double> depth_mm = comparison.truth.along_direction.depth_mm;
   for (std::size_t v = 0; v < depth_mm.size(); ++v) {
     depth_mm[v] = comparison.region.scored[v] ? depth_mm[v] : kNaN;

@@ -19,13 +19,13 @@
 namespace semblance {
 namespace {
 
-// What the options may say of levels, given the generic face.
+// The levels of the generic face, which limit those of other options.
 struct TemplateLevels {
   int finest = 0;
-  std::string remedy;  // for a level beyond it
+  std::string remedy;  // for a finer level
 };
 
-TemplateLevels LevelsOf(const TemplateSource& source) {
+TemplateLevels FindLevels(const TemplateSource& source) {
   if (const auto* formula = std::get_if<FormulaTemplate>(&source)) {
     return {formula->max_level, "raise template.max_level"};
   }
@@ -56,7 +56,7 @@ class LevelCheck {
   std::vector<OptionFault> faults_;
 };
 
-// Of a bust that the user brings; the program's own is known to be sound.
+// Checks the user's bust. The program's own is known to be sound.
 void CheckBust(const Experiment& experiment, std::vector<OptionFault>& faults) {
   if (!std::holds_alternative<MeshBust>(experiment.bust) &&
       !std::holds_alternative<HSplineBust>(experiment.bust)) {
@@ -83,7 +83,7 @@ FaceSource WayToFace(const Experiment& experiment) {
 
 namespace {
 
-// The options that ask for the table's mean.
+// The options that require the table's mean.
 std::vector<std::string> TableMeans(const DepthScheme& scheme) {
   const auto* const mixture = std::get_if<AutoScheme>(&scheme);
   if (mixture == nullptr) {
@@ -99,17 +99,17 @@ std::vector<std::string> TableMeans(const DepthScheme& scheme) {
   return options;
 }
 
-// A mean that is the table's tells nothing of the table's own depths.
+// The table's mean adds no information to the table's own depths.
 void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& faults) {
   for (const std::string& option : TableMeans(experiment.interp)) {
     if (experiment.tissue.depths == DepthSource::kTable) {
       faults.push_back({option,
-                        "the depths are the table's own (tissue.depths: table), of which its mean "
-                        "tells nothing more; measure depths, or take `mean: constant`"});
+                        "the depths are the table's own (tissue.depths: table), and its mean "
+                        "adds nothing to them; measure depths, or take `mean: constant`"});
     } else if (experiment.tissue.table.empty()) {
       faults.push_back(
           {option,
-           "`table` takes the mean depths of tissue.table, and none is named; name one, "
+           "`table` needs the mean depths of tissue.table, and none is named; name one, "
            "e.g. configs/tables/t_table_2023.yaml, or take `mean: constant`"});
     }
   }
@@ -130,7 +130,7 @@ void CheckRegion(const FaceRegionOptions& region, std::vector<OptionFault>& faul
   }
 }
 
-// A prior that is asked but names no files.
+// Checks that the source of a used prior names its files.
 void CheckPriorFiles(const PriorSource& source, std::vector<OptionFault>& faults) {
   const auto need = [&](const char* field, const std::filesystem::path& file, const char* remedy) {
     if (file.empty()) {
@@ -149,7 +149,7 @@ void CheckPriorFiles(const PriorSource& source, std::vector<OptionFault>& faults
   }
 }
 
-// The auto plan fits levels as the points want them, and would smooth eyes, nose and mouth away.
+// The auto plan fits the levels that the points need, and would smooth eyes, nose and mouth away.
 void CheckAutoPlan(const Experiment& experiment, std::vector<OptionFault>& faults) {
   const FaceSource face = WayToFace(experiment);
   const bool fits =
@@ -180,15 +180,15 @@ void CheckReference(const Experiment& experiment, std::vector<OptionFault>& faul
   }
 }
 
-// Terms and priors that only some ways to a face look at.
+// Checks terms and priors that only some ways to a face use.
 void CheckWayToFace(const Experiment& experiment, std::vector<OptionFault>& faults) {
   const FaceSource face = WayToFace(experiment);
   const bool asks = AsksPrior(face);
   if (asks && std::holds_alternative<IctPrior>(experiment.prior) &&
       !std::holds_alternative<IctTemplate>(experiment.face_template)) {
     faults.push_back({"face",
-                      "it asks the prior 'ict', which is one of `template: ict`; take that "
-                      "template, a prior of yours, or `face: fit`"});
+                      "it uses the prior 'ict', which fits `template: ict` alone; take that "
+                      "template, your own prior, or `face: fit`"});
   }
   if (asks) {
     CheckPriorFiles(experiment.prior, faults);
@@ -196,7 +196,7 @@ void CheckWayToFace(const Experiment& experiment, std::vector<OptionFault>& faul
   CheckReference(experiment, faults);
   if (asks && std::holds_alternative<NoPrior>(experiment.prior)) {
     faults.push_back({"face",
-                      "it asks a prior, and there is none; name one under `prior`, or take "
+                      "it uses a prior, and there is none; name one under `prior`, or take "
                       "`face: fit`"});
   }
   const bool holds_shape = std::ranges::any_of(experiment.fit.terms, [](const Term& term) {
@@ -204,7 +204,7 @@ void CheckWayToFace(const Experiment& experiment, std::vector<OptionFault>& faul
   });
   if (holds_shape && !std::holds_alternative<PriorThenFit>(face)) {
     faults.push_back({"fit.terms",
-                      "the term 'prior_shape' looks at a prior's face; leave it out, or write "
+                      "the term 'prior_shape' needs a prior's face; leave it out, or write "
                       "`face: prior_then_fit`"});
   }
 }
@@ -213,8 +213,9 @@ std::string_view NameOf(const FaceSource& face) {
   return std::visit([](const auto& way) { return way.kName; }, face);
 }
 
-// What of `uncertainty` this way to a face does not look at. template_sd_mm and unseen_sd_mm may
-// stand with any: they say of a template, which a phantom's has in common, whether it is exact.
+// Refuses options of `uncertainty` that the way to the face does not use. template_sd_mm and
+// unseen_sd_mm are accepted with every way, because they state whether a template is exact, as that
+// of a phantom is.
 void CheckUncertainty(const Experiment& experiment, std::vector<OptionFault>& faults) {
   const FaceSource face = WayToFace(experiment);
   if (std::holds_alternative<FittedTemplate>(face)) {
@@ -225,7 +226,7 @@ void CheckUncertainty(const Experiment& experiment, std::vector<OptionFault>& fa
   const auto refuse = [&](const char* field, const std::string& remedy) {
     faults.push_back(
         {fmt::format("uncertainty.{}", field),
-         fmt::format("`face: {}` does not look at it; leave it out{}", NameOf(face), remedy)});
+         fmt::format("`face: {}` does not use it; leave it out{}", NameOf(face), remedy)});
   };
   const auto of_fit = [&](const char* field, double UncertaintyOptions::*option,
                           const char* of_prior) {
@@ -234,16 +235,15 @@ void CheckUncertainty(const Experiment& experiment, std::vector<OptionFault>& fa
     }
   };
   of_fit("dowel_sd_mm", &UncertaintyOptions::dowel_sd_mm, "");
-  of_fit("implicit_sd_mm", &UncertaintyOptions::implicit_sd_mm,
-         ", say it under face.implicit_spread");
-  of_fit("own", &UncertaintyOptions::own, ", say it under face.table_depths.own");
-  of_fit("shared", &UncertaintyOptions::shared, ", say it under face.table_depths.shared");
+  of_fit("implicit_sd_mm", &UncertaintyOptions::implicit_sd_mm, ", set face.implicit_spread");
+  of_fit("own", &UncertaintyOptions::own, ", set face.table_depths.own");
+  of_fit("shared", &UncertaintyOptions::shared, ", set face.table_depths.shared");
   if (given.samples > 0 && !asks) {
     refuse("samples", ", or write `face: fit` or one of a prior, which can be drawn from");
   }
 }
 
-// The paths of what differs, as deep as both are maps.
+// Adds the paths of differing options, descending where both are maps.
 void AddDifferences(const std::string& path, const ConfigNode& given, const ConfigNode& usual,
                     std::vector<std::string>& paths) {
   if (ToFlowYaml(given) == ToFlowYaml(usual)) {
@@ -261,7 +261,7 @@ void AddDifferences(const std::string& path, const ConfigNode& given, const Conf
   }
 }
 
-std::vector<std::string> UnusedOfFit(const Experiment& experiment) {
+std::vector<std::string> UnusedFitOptions(const Experiment& experiment) {
   std::vector<std::string> notes = UnusedOptions(experiment.fit);
   for (std::string& note : notes) {
     note.insert(0, "fit.");
@@ -272,7 +272,7 @@ std::vector<std::string> UnusedOfFit(const Experiment& experiment) {
 }  // namespace
 
 std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
-  const TemplateLevels levels = LevelsOf(experiment.face_template);
+  const TemplateLevels levels = FindLevels(experiment.face_template);
   LevelCheck check(levels);
   check.Steps("first_fit", experiment.first_fit);
   check.At("seeds.direction_level", experiment.seeds.direction_level);
@@ -281,7 +281,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
     faults.push_back(
         {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
   }
-  for (const OptionFault& fault : FaultsOfRules(experiment.rules)) {
+  for (const OptionFault& fault : CheckRules(experiment.rules)) {
     faults.push_back({"rules." + fault.path, fault.what});
   }
   for (const OptionFault& fault : FaultsOfSites(experiment.sites)) {
@@ -295,14 +295,14 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   CheckAutoPlan(experiment, faults);
   CheckBust(experiment, faults);
   return faults;
-} catch (const Error& error) {  // of a template that cannot be used; its levels are not known
+} catch (const Error& error) {  // the template cannot be used, so its levels are unknown
   return {{"template", error.what()}};
 }
 
 std::vector<std::string> UnusedOptions(const Experiment& experiment) {
   const FaceSource face = WayToFace(experiment);
   if (std::holds_alternative<FittedTemplate>(face)) {
-    return UnusedOfFit(experiment);
+    return UnusedFitOptions(experiment);
   }
   const ConfigNode given = ConfigTreeOf(experiment), usual = ConfigTreeOf(Experiment());
   std::vector<std::string> paths;
@@ -316,15 +316,27 @@ std::vector<std::string> UnusedOptions(const Experiment& experiment) {
   }
   std::vector<std::string> notes;
   if (std::holds_alternative<PriorThenFit>(face)) {
-    notes = UnusedOfFit(experiment);
+    notes = UnusedFitOptions(experiment);
   }
   for (const std::string& path : paths) {
-    notes.push_back(fmt::format("{}: `face: {}` does not look at it{}", path, NameOf(face),
+    notes.push_back(fmt::format("{}: `face: {}` does not use it{}", path, NameOf(face),
                                 path == "seeds.weight" && AsksPrior(face)
-                                    ? "; face.seed_weight of prior_then_fit stands in its place"
+                                    ? "; face.seed_weight of prior_then_fit replaces it"
                                     : ""));
   }
   return notes;
 }
+
+template ConfigNode ConfigTreeOf(const Experiment& value);
+template Experiment ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors);
+template Experiment ReadConfig(const std::filesystem::path& file,
+                               std::span<const std::string> overrides);
+template Experiment ReadConfigText(std::string_view text, const std::filesystem::path& pretend_file,
+                                   std::span<const std::string> overrides);
+template std::string WriteConfig(const Experiment& value);
+template std::string OptionsReference<Experiment>();
+template std::string OptionsSchema<Experiment>();
+
+ConfigType DescribeExperiment() { return config_internal::DescribeType(Experiment{}); }
 
 }  // namespace semblance

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reading and writing an experiment's configuration (config.h): these templates take long to
-// compile, so they are instantiated in one place.
+// An experiment's options as text: its configuration (config.h), and keys of stages made from
+// options. The templates take long to compile, so they are instantiated in one place
+// (experiment.cc).
 #pragma once
 
 #include <filesystem>
@@ -24,7 +25,19 @@ extern template std::string WriteConfig(const Experiment& value);
 extern template std::string OptionsReference<Experiment>();
 extern template std::string OptionsSchema<Experiment>();
 
-// All options as data, with their defaults: for whatever offers them to people.
+// All options with their defaults, as data for user interfaces.
 ConfigType DescribeExperiment();
+
+// A key of the stage cache (stage_cache.h): the stage's name and the resolved options from which
+// its value is made, one per line. Paths are not resolved to contents, so a file must not change
+// while a cache lives.
+template <class... Options>
+std::string StageKey(const char* stage, const Options&... options) {
+  std::string key = stage;
+  for (const std::string& text : {ToFlowYaml(ConfigTreeOf(options))...}) {
+    key += "\n" + text;
+  }
+  return key;
+}
 
 }  // namespace semblance

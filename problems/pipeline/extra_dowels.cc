@@ -13,7 +13,7 @@
 #include "problems/conditional/condition_depths.h"
 #include "problems/config/spelling_suggestion.h"
 #include "problems/face_template/template_source.h"
-#include "problems/pipeline/dowel_target.h"
+#include "problems/pipeline/dowel_placement.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
@@ -27,7 +27,7 @@ const Landmark* FindLandmark(const LandmarkFile& file, const std::string& site) 
 
 bool IsKnown(const std::string& site) { return IsStandardSite(site) || IsFurtherSite(site); }
 
-// Where sites stand before they are laid onto bone.
+// Finds the points of sites before they are laid onto bone.
 class Placing {
  public:
   Placing(const Experiment& experiment, const SubjectData& data, const MeshQuery& skull,
@@ -47,7 +47,7 @@ class Placing {
   }
 
  private:
-  // Of the generic face, brought to the dowels that there are.
+  // The generic face, brought to the dowels.
   const HSplineSurface& Face() {
     if (!face_) {
       const TemplateFace generic = LoadTemplate(experiment_.face_template);
@@ -58,7 +58,7 @@ class Placing {
   }
 
   Vec3 UnderFace(const std::string& name, const Vec2& uv) {
-    constexpr double kOver_mm = 30, kFar_mm = 120;
+    constexpr double kOver_mm = 30, kFar_mm = 120;  // a ray from outside the face through the head
     const SurfaceFrame at = Face().Frame(uv);
     const Vec3 out = at.Normal();
     const auto hit =
@@ -91,13 +91,14 @@ Dowel OnBone(const std::string& name, const Vec3& point, const SubjectData& data
 }
 
 void CheckApart(const Dowel& dowel, std::span<const Dowel> others) {
-  constexpr double kSame_mm = 0.5;
+  constexpr double kSame_mm = 0.5;  // closer dowels would ask for two depths of one point
   for (const Dowel& other : others) {
     if ((dowel.base - other.base).norm() <= kSame_mm) {
-      throw InputError(fmt::format(
-          "sites.{}: it stands where {} stands, so one point of the bone has two depths; place it "
-          "elsewhere, or set the depth of {} alone",
-          dowel.site, SiteInWords(other.site), other.site));
+      throw InputError(
+          fmt::format("sites.{}: it is at the same place as {}, so one point of the bone has two "
+                      "depths; place it "
+                      "elsewhere, or set the depth of {} alone",
+                      dowel.site, SiteInWords(other.site), other.site));
     }
   }
 }
@@ -121,7 +122,8 @@ std::string TableWith(const TissueOptions& tissue, const std::string& site) {
       name, near.empty() ? "" : fmt::format(" (or is '{}' meant?)", near)));
 }
 
-// Whether a site of the landmarks is only given a (u,v) or a depth. Throws if it is placed anew.
+// True for a landmark, to which `sites` may only give a (u,v) or a depth. Throws if it is placed
+// again.
 bool IsLandmark(const std::string& name, const ExtraSite& site, const LandmarkFile& file) {
   if (FindLandmark(file, name) == nullptr) {
     return false;
@@ -135,16 +137,16 @@ bool IsLandmark(const std::string& name, const ExtraSite& site, const LandmarkFi
   return true;
 }
 
-// Sets the depth that `sites` states, and tells where it comes from.
-std::string TakeOwnDepth(const AutoOr<double>& depth, Dowel& dowel) {
+// Sets the depth that `sites` states. Returns a description of its source.
+std::string SetOwnDepth(const AutoOr<double>& depth, Dowel& dowel) {
   dowel.depth_mm = depth.automatic ? kNaN : depth.value;
   return depth.automatic ? "as deep as interpolated there; it changes no other depth"
                          : fmt::format("{} mm, set by hand", depth.value);
 }
 
-// Where a depth comes from that `sites` does not state. Throws InputError where there is none.
-std::string SourceOf(const TissueOptions& tissue, const LandmarkFile& landmarks,
-                     const std::string& site) {
+// Describes the source of a depth that `sites` does not state. Throws InputError if there is none.
+std::string DescribeSource(const TissueOptions& tissue, const LandmarkFile& landmarks,
+                           const std::string& site) {
   if (!SetFor(tissue, site).empty()) {
     return "of tissue.set_mm";
   }
@@ -158,7 +160,7 @@ std::string SourceOf(const TissueOptions& tissue, const LandmarkFile& landmarks,
   return fmt::format("from table '{}'", table);
 }
 
-// The keys of set_mm that hold for one of the sites.
+// The keys of set_mm that apply to one of the sites.
 std::set<std::string> SetsFor(const TissueOptions& tissue, std::span<const std::string> sites) {
   std::set<std::string> keys;
   for (const std::string& site : sites) {
@@ -167,8 +169,8 @@ std::set<std::string> SetsFor(const TissueOptions& tissue, std::span<const std::
   return keys;
 }
 
-// Takes the entries of set_mm away that are for inserted dowels and no landmark: the landmarks'
-// depths would tell them as unused.
+// Removes the entries of set_mm that apply to inserted dowels and to no landmark. Filling the
+// landmarks' depths would report them as unused.
 void LeaveToInserted(std::span<const std::string> inserted, const LandmarkFile& landmarks,
                      TissueOptions& tissue) {
   std::vector<std::string> sites;
@@ -179,8 +181,8 @@ void LeaveToInserted(std::span<const std::string> inserted, const LandmarkFile& 
   });
 }
 
-// The depths that `sites` does not state, as landmarks get theirs. Returns what people should know.
-std::vector<std::string> TakeTissueDepths(TissueOptions tissue, const LandmarkFile& landmarks,
+// Fills the depths that `sites` does not state, as for landmarks. Returns notes.
+std::vector<std::string> FillTissueDepths(TissueOptions tissue, const LandmarkFile& landmarks,
                                           std::vector<Dowel>& dowels) {
   if (dowels.empty()) {
     return {};
@@ -190,21 +192,21 @@ std::vector<std::string> TakeTissueDepths(TissueOptions tissue, const LandmarkFi
   const std::set<std::string> sets = SetsFor(tissue, sites);
   std::erase_if(tissue.set_mm, [&](const auto& entry) { return !sets.contains(entry.first); });
   std::vector<std::string> notes = FillDepths(tissue, landmarks, dowels);
-  ConditionDepths(tissue, landmarks, dowels);  // its notes are the landmarks' own
+  ConditionDepths(tissue, landmarks, dowels);  // the landmarks have given its notes already
   return notes;
 }
 
-// Gives each dowel its depth. Returns where each comes from, and what else people should know.
+// Gives each dowel its depth. Returns notes on the sources of the depths, then those of the tissue.
 std::vector<std::string> GiveInserted(const Experiment& experiment, const LandmarkFile& landmarks,
                                       std::vector<Dowel>& dowels) {
   std::vector<Dowel> of_tissue;
   for (const Dowel& dowel : dowels) {
     if (!experiment.sites.at(dowel.site).depth) {
-      SourceOf(experiment.tissue, landmarks, dowel.site);  // throws where there is none
+      DescribeSource(experiment.tissue, landmarks, dowel.site);  // throws if there is none
       of_tissue.push_back(dowel);
     }
   }
-  const std::vector<std::string> more = TakeTissueDepths(experiment.tissue, landmarks, of_tissue);
+  const std::vector<std::string> more = FillTissueDepths(experiment.tissue, landmarks, of_tissue);
   std::vector<std::string> notes;
   for (Dowel& dowel : dowels) {
     const auto& own = experiment.sites.at(dowel.site).depth;
@@ -212,9 +214,9 @@ std::vector<std::string> GiveInserted(const Experiment& experiment, const Landma
     dowel = filled == of_tissue.end() ? dowel : *filled;
     notes.push_back(
         fmt::format("site {}: dowel inserted, {}", SiteInWords(dowel.site),
-                    own ? TakeOwnDepth(*own, dowel)
+                    own ? SetOwnDepth(*own, dowel)
                         : fmt::format("{:.4g} mm, {}", dowel.depth_mm,
-                                      SourceOf(experiment.tissue, landmarks, dowel.site))));
+                                      DescribeSource(experiment.tissue, landmarks, dowel.site))));
   }
   notes.insert(notes.end(), more.begin(), more.end());
   return notes;
@@ -226,7 +228,7 @@ bool IsNamed(const NetworkPlan& plan, const std::string& site) {
   });
 }
 
-// Of those of the triangle's corners that have one; NaN if none has.
+// The depth at a point of a triangle, from those of its corners that have one. NaN if none has.
 double DepthAt(const MeshPoint& at, const Triangle& corners, const DepthField& depth) {
   double sum = 0, weights = 0;
   for (int k = 0; k < 3; ++k) {

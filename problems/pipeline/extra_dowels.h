@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The dowels that an experiment has beside those of the landmarks (Experiment::sites): placed,
-// given a depth, joined to the network.
+// The dowels of an experiment in addition to those of the landmarks (Experiment::sites): their
+// places, their depths, and their areas in the network.
 #pragma once
 
 #include <span>
@@ -14,29 +14,29 @@
 
 namespace semblance {
 
-// The experiment's tissue as it holds for the landmarks: with the depths of `sites` that are
-// landmarks' among set_mm, and without those of set_mm that only inserted dowels take. Throws
-// InputError where a depth is in both, or is auto.
+// The experiment's tissue options for the landmarks. set_mm has the depths of those `sites` that
+// are landmarks, and lacks the entries that only inserted dowels use. Throws InputError if a depth
+// appears in both or is auto.
 TissueOptions WithSiteDepths(const Experiment& experiment, const LandmarkFile& landmarks);
 
-// Adds a dowel for each of experiment.sites that is no landmark, with a note: to dowels_on_bone, or
-// to open_dowels where its depth is to be interpolated. One whose depth is not stated has the
-// tissue's, as a landmark there would (FillDepths, whose notes come after). `near`: laid on the
-// nearest bone; `uv`: on the bone under that point of the generic face, which is brought to the
-// subject's dowels. Its role is kLandmark at a site of sites.h, else kInserted. Throws InputError
-// for a site that is a landmark already, stands on another dowel, is off the bone, or has no depth
-// in a table either.
+// Adds a dowel, with a note, for each of experiment.sites that is no landmark: to dowels_on_bone,
+// or to open_dowels if its depth is to be interpolated. Without a stated depth it gets the tissue's
+// depth, as a landmark at this site would (FillDepths, whose notes follow). `near` places it on the
+// nearest bone. `uv` places it on the bone under that point of the generic face, which is brought
+// to the subject's dowels. The role is kLandmark at a site of sites.h, else kInserted. Throws
+// InputError for a site that is a landmark already, lies on another dowel or off the bone, or has
+// no depth in a table either.
 void InsertDowels(const Experiment& experiment, const SubjectData& data, const MeshQuery& skull,
                   Case& subject);
 
 // Joins the dowels that are at no standard site and in no area of the plan to the network
-// (network_insertion.h). Returns a note for each that lies outside it.
+// (network_insertion.h). Returns a note for each dowel outside the network.
 std::vector<std::string> JoinNetwork(const NetworkPlan& plan, std::span<const Dowel> dowels,
                                      DowelNetwork& network);
 
-// Gives the open dowels the depth that was interpolated at the nearest point of the shell, on which
-// they then stand, and adds them to dowels_on_bone: the fit takes them, the depths do not. One
-// where no depth is known is left out, with a note.
+// Gives the open dowels the depth that was interpolated at the nearest point of the shell, moves
+// them there, and adds them to dowels_on_bone. So the fit uses them, but no depth depends on them.
+// A dowel without an interpolated depth is left out, with a note.
 void FillOpenDowels(const TriMesh& shell, const DepthField& depth, Case& subject);
 
 }  // namespace semblance

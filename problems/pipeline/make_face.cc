@@ -13,11 +13,12 @@
 #include <utility>
 
 #include "problems/conditional/condition_depths.h"
+#include "problems/edits/edit_script.h"
 #include "problems/landmark_files/read_landmarks.h"
-#include "problems/pipeline/dowel_target.h"
-#include "problems/pipeline/stage_key.h"
+#include "problems/pipeline/dowel_placement.h"
+#include "problems/pipeline/experiment_config.h"
 #include "problems/prior/hspline_prior.h"
-#include "problems/prior/prior_target.h"
+#include "problems/prior/prior_observations.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/base/thin_plate.h"
@@ -47,36 +48,48 @@ PlacedTemplate Place(const TemplateFace& generic, const std::vector<Dowel>& dowe
   return {std::move(dowels), face_from_template, std::move(placed)};
 }
 
-// The fit's options, and that relaxation leaves alone what is held by hand.
-FitOptions FitKeeping(const ExtraSites& sites, FitOptions options) {
+// ---------------------------------------------------------------------------------------------
+// Fitting
+// ---------------------------------------------------------------------------------------------
+
+// The options of seeding and fitting, as the way to the face changes them.
+struct FitPlan {
+  std::vector<ScheduleStep> first_fit;
+  SeedOptions seeds;
+  FitOptions fit;
+  int rounds;
+};
+
+FitPlan PlanFit(const Experiment& experiment) {
+  FitPlan plan{experiment.first_fit, experiment.seeds, experiment.fit, experiment.rounds};
   std::visit(
-      [&sites]<class R>(R& relaxation) {
+      [&experiment]<class R>(R& relaxation) {
         if constexpr (std::is_base_of_v<PointMoves, R>) {
-          for (const auto& [name, site] : sites) {
-            if (site.hold) {
+          for (const auto& [name, site] : experiment.sites) {
+            if (site.hold) {  // the (u,v) is set by hand: relaxation must not move it
               relaxation.kept.push_back(name);
             }
           }
         }
       },
-      options.relaxation);
-  return options;
+      plan.fit.relaxation);
+  return plan;
 }
 
-bool LooksAtBone(const std::vector<Term>& terms) {
+bool NeedsBoneAnchors(const std::vector<Term>& terms) {
   return std::any_of(terms.begin(), terms.end(), [](const Term& term) {
     return std::holds_alternative<NonPenetrationTerm>(term) ||
            std::holds_alternative<SpringTerm>(term);
   });
 }
 
-// Where seeds stand on the shell of the skull: nearest, and seen from there.
-std::vector<BoneAnchor> AnchorsOf(const std::vector<FitPoint>& seeds, const TriMesh& shell) {
+// The anchors of seeds: the nearest points of the skull's shell, and the directions from there.
+std::vector<BoneAnchor> FindAnchors(const std::vector<FitPoint>& seeds, const TriMesh& shell) {
   const MeshQuery query(shell);
   std::vector<BoneAnchor> anchors;
   for (const FitPoint& seed : seeds) {
     const MeshPoint nearest = query.Closest(seed.position);
-    const Vec3 out = nearest.distance_mm > 1e-6
+    const Vec3 out = nearest.distance_mm > 1e-6  // else the seed lies on the shell
                          ? Vec3(seed.position - nearest.position)
                          : TriangleAreaVector(shell, shell.triangles[nearest.triangle]);
     anchors.push_back({nearest.position, out.normalized()});
@@ -84,14 +97,14 @@ std::vector<BoneAnchor> AnchorsOf(const std::vector<FitPoint>& seeds, const TriM
   return anchors;
 }
 
-// The template, bent to the dowels alone: what the first seeds are taken on.
-HSplineSurface FirstFit(const Experiment& experiment, const TemplateFace& placed,
-                        const FitTarget& dowels, const RunContext& context) {
-  if (experiment.first_fit.empty()) {
+// The template, fitted to the dowels alone. The first seeds are taken on it.
+HSplineSurface FirstFit(const FitPlan& plan, const TemplateFace& placed, const FitTarget& dowels,
+                        const RunContext& context) {
+  if (plan.first_fit.empty()) {
     return placed.surface;
   }
-  FitOptions first = experiment.fit;
-  first.plan = ListedPlan{.schedule = experiment.first_fit, .aim = AimOf(experiment.fit.plan)};
+  FitOptions first = plan.fit;
+  first.plan = ListedPlan{.schedule = plan.first_fit, .aim = AimOf(plan.fit.plan)};
   first.relaxation = NoRelaxation{};
   return Fit(placed.surface, placed.surface, dowels, FeatureVertices(placed), first, context)
       .surface;
@@ -101,14 +114,14 @@ FitTarget WithSeeds(FitTarget target, const std::vector<FitPoint>& seeds,
                     const std::vector<Term>& terms, const TriMesh& shell) {
   target.points.insert(target.points.end(), seeds.begin(), seeds.end());
   target.anchors.resize(target.points.size());
-  if (LooksAtBone(terms)) {
-    const std::vector<BoneAnchor> anchors = AnchorsOf(seeds, shell);
+  if (NeedsBoneAnchors(terms)) {
+    const std::vector<BoneAnchor> anchors = FindAnchors(seeds, shell);
     std::copy(anchors.begin(), anchors.end(), target.anchors.end() - std::ssize(anchors));
   }
   return target;
 }
 
-// What a fit on top of a prior's face knows besides.
+// The additional input of a fit that starts from a prior's face.
 struct PriorKnowledge {
   std::vector<ShapePoint> shape = {};
   std::vector<Sphere> features = {};
@@ -126,35 +139,54 @@ void Weigh(const FitTarget& dowels, const PriorKnowledge& known, std::vector<Fit
   WeighSeeds(tips, known.features, *known.trust, seeds);
 }
 
-// Dowels first, then, round by round, seeds where the surface has come to lie and the schedule to
-// both (see seeding.h for why).
-FaceFit FitFace(const Experiment& experiment, const PlacedTemplate& placed, const FaceInput& in,
+// Fits the dowels first. Then each round takes seeds from the surface as it lies now and runs the
+// schedule with dowels and seeds (see seeding.h for the reason).
+FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInput& in,
                 const PriorKnowledge& known, const RunContext& context) {
   const HSplineSurface& rest = placed.face.surface;
   const std::vector<VertexId> features = FeatureVertices(placed.face);
   const std::vector<Sphere> masks = TemplateMasks(placed.face);
-  const FitOptions options = FitKeeping(experiment.sites, experiment.fit);
   FitTarget dowels = placed.dowels;
   const MeshQuery query(in.implicit);
-  HSplineSurface surface = FirstFit(experiment, placed.face, dowels, context);
+  HSplineSurface surface = FirstFit(plan, placed.face, dowels, context);
   std::optional<FaceFit> result;
-  for (int round = 0; round < experiment.rounds; ++round) {
-    context.Report("fit", fmt::format("round {} of {}", round + 1, experiment.rounds));
-    SeedResult seeding = SeedDowels(surface, query, in.implicit, masks, experiment.seeds);
+  for (int round = 0; round < plan.rounds; ++round) {
+    context.Report("fit", fmt::format("round {} of {}", round + 1, plan.rounds));
+    SeedResult seeding = SeedDowels(surface, query, in.implicit, masks, plan.seeds);
     Weigh(dowels, known, seeding.points);
-    FitTarget target = WithSeeds(dowels, seeding.points, experiment.fit.terms, in.shell);
+    FitTarget target = WithSeeds(dowels, seeding.points, plan.fit.terms, in.shell);
     target.shape = known.shape;
-    FitResult fit = Fit(surface, rest, target, features, options, context);
+    FitResult fit = Fit(surface, rest, target, features, plan.fit, context);
     surface = fit.surface;
     for (std::size_t k = 0; k < dowels.points.size(); ++k) {
-      dowels.points[k].uv = fit.uv[k];  // where relaxation has left them
+      dowels.points[k].uv = fit.uv[k];  // relaxation may have moved it
     }
     result.emplace(FaceFit{std::move(seeding), std::move(target), std::move(fit)});
   }
   return std::move(*result);
 }
 
-// A face that no fit has touched, in the form of a fit's result.
+// Residuals and their RMS, weighted as those of a fit, for a surface that the fit has not made.
+void MeasureResiduals(FaceFit& fitted) {
+  FitResult& fit = fitted.fit;
+  double all = 0, weight = 0, of_dowels = 0, dowel_weight = 0;
+  fit.residual_mm.clear();
+  for (std::size_t k = 0; k < fitted.target.points.size(); ++k) {
+    const FitPoint& point = fitted.target.points[k];
+    fit.residual_mm.push_back((fit.surface.Point(fit.uv[k]) - point.position).norm());
+    const double squared = point.weight * fit.residual_mm[k] * fit.residual_mm[k];
+    all += squared;
+    weight += point.weight;
+    if (point.role != PointRole::kSeed) {
+      of_dowels += squared;
+      dowel_weight += point.weight;
+    }
+  }
+  fit.point_rms_mm = std::sqrt(all / weight);
+  fit.dowel_rms_mm = std::sqrt(of_dowels / dowel_weight);
+}
+
+// A face without a fit, in the form of a fit's result.
 FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels) {
   FitResult fit{.surface = std::move(surface)};
   for (const FitPoint& point : dowels.points) {
@@ -166,6 +198,10 @@ FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels) {
   MeasureResiduals(unfitted);
   return unfitted;
 }
+
+// ---------------------------------------------------------------------------------------------
+// Bending
+// ---------------------------------------------------------------------------------------------
 
 struct PointPairs {
   std::vector<Vec3> from, to;
@@ -180,11 +216,11 @@ PointPairs FromSitesToTips(const HSplineSurface& surface, const FitTarget& dowel
   return pairs;
 }
 
-// Of the landmarks that both skulls have.
+// The landmarks that both skulls have.
 PointPairs FromSkullToSkull(const std::filesystem::path& reference,
                             const Similarity& face_from_template,
                             const std::map<std::string, Vec3>& subject) {
-  constexpr std::size_t kFewest = 4;
+  constexpr std::size_t kFewestLandmarks = 4;  // a thin plate needs as many
   PointPairs pairs;
   for (const Landmark& landmark : InLpsMm(ReadLandmarks(reference).file).landmarks) {
     if (const auto same = subject.find(landmark.site); same != subject.end()) {
@@ -193,11 +229,11 @@ PointPairs FromSkullToSkull(const std::filesystem::path& reference,
       pairs.to.push_back(same->second);
     }
   }
-  if (pairs.from.size() < kFewest) {
+  if (pairs.from.size() < kFewestLandmarks) {
     throw InputError(
         fmt::format("{}: it shares {} landmarks with the subject, and from skull to skull at least "
                     "{} are needed",
-                    reference.string(), pairs.from.size(), kFewest));
+                    reference.string(), pairs.from.size(), kFewestLandmarks));
   }
   return pairs;
 }
@@ -206,14 +242,19 @@ HSplineSurface UnderThinPlate(const HSplineSurface& surface, const PointPairs& p
                               double stiffness_mm) {
   std::vector<Vec3> samples;
   const ThinPlate plate = FitThinPlate(pairs.from, pairs.to, {}, {.stiffness_mm = stiffness_mm});
-  const DomainGrid grid = GridOf(surface.shape());
+  const DomainGrid grid = MakeDomainGrid(surface.shape());
   for (std::size_t k = 0; k < grid.size(); ++k) {
     samples.push_back(plate(surface.Point(grid.UvAt(k))));
   }
   return SurfaceThrough(surface.shape(), grid, samples);
 }
 
-// Dowels at sites that the prior lacks: where the ray of the dowel meets the placed template.
+// ---------------------------------------------------------------------------------------------
+// The prior's most likely face
+// ---------------------------------------------------------------------------------------------
+
+// The model's points for dowels at sites that the prior lacks: under the points in which the rays
+// of the dowels meet the placed template.
 std::map<std::string, ModelPoint> OtherSites(const FitTarget& dowels, const LoadedPrior& prior) {
   std::map<std::string, ModelPoint> others;
   for (const FitPoint& point : dowels.points) {
@@ -229,9 +270,9 @@ bool HasOtherSites(const FacePrior& prior, const ShapeTarget& target) {
                              [&](const ShapeTip& tip) { return !prior.sites.contains(tip.label); });
 }
 
-// The points of other sites on the model, found on a face that was only placed, become those
-// nearest to the tips on the estimated face.
-void MeetAnew(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& target) {
+// Moves the model's points of sites that the prior lacks to the points of the estimated face that
+// are nearest to the tips. They were found on a face that was only placed.
+void Reproject(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& target) {
   const MeshQuery query(TriMesh{shape.points, prior.model.mean.triangles});
   for (ShapeTip& tip : target.tips) {
     if (!prior.sites.contains(tip.label)) {
@@ -241,22 +282,23 @@ void MeetAnew(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& t
   }
 }
 
-// Twice where a dowel stands at a site that the prior lacks; spread is told of the last.
+// Estimates twice if the prior lacks a dowel's site. Only the second estimate computes the spread.
 ShapeEstimate Estimate(const FacePrior& prior, const PriorUse& use, ShapeTarget& target,
                        const RunContext& context) {
   if (HasOtherSites(prior, target)) {
     const bool tells_spread = std::exchange(target.tells_spread, false);
-    MeetAnew(EstimateShape(prior.model, target, use.estimate, context), prior, target);
+    Reproject(EstimateShape(prior.model, target, use.estimate, context), prior, target);
     target.tells_spread = tells_spread;
   }
   return EstimateShape(prior.model, target, use.estimate, context);
 }
 
-// With depths of a table a person's build is not known, and the tips carry it into sigma. Around
-// sites without a dowel, as where no bone was scanned, no tip does: the site's own deviation does.
+// With depths of a table the person's build is unknown. The tips carry this into sigma. Around
+// sites without a dowel, for example where no bone was scanned, no tip does, so the deviation of
+// the site is added here.
 void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
                          const TableDepthOptions& table, std::vector<double>& sigma_mm) {
-  constexpr double kUsualDepth_mm = 10;  // of a site whose deviation goes by its depth
+  constexpr double kUsualDepth_mm = 10;  // stands for the unknown depth in PublishedSd_mm
   std::map<std::string, Vec3> places;
   for (const auto& [site, at] : prior.sites) {
     places[site] = PositionOf(at, prior.model.mean, prior.model.mean.points);
@@ -280,15 +322,15 @@ void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
   }
 }
 
-// None of a subject whose pose is not known.
-RuleMarks RulesOf(const FaceInput& in, const FacePrior& prior) {
-  return in.subject.basis.sites ? MarksOfRules(in.experiment.rules, in.subject.points,
-                                               in.subject.basis.sites->skull_from_average, prior)
+// Without a pose of the subject no rule applies.
+RuleMarks ApplySubjectRules(const FaceInput& in, const FacePrior& prior) {
+  return in.subject.basis.sites ? ApplyRules(in.experiment.rules, in.subject.points,
+                                             in.subject.basis.sites->skull_from_average, prior)
                                 : RuleMarks();
 }
 
-// Random seeds of the faces to draw: first the one that takes the place of the most likely face.
-std::vector<std::uint64_t> DrawsOf(const PriorUse& use, const UncertaintyOptions& options) {
+// The random seeds of the faces to draw. The first one may replace the most likely face.
+std::vector<std::uint64_t> ListDraws(const PriorUse& use, const UncertaintyOptions& options) {
   std::vector<std::uint64_t> random_seeds;
   if (use.draw > 0) {
     random_seeds.push_back(use.draw);
@@ -312,9 +354,10 @@ void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made) {
   }
 }
 
-// A table's deviations are of people at large, which its options split into what a person's depths
-// have in common and what they have not; those given something of this person are its own.
-TableDepthOptions PartsOf(const TableDepthOptions& table, const Experiment& experiment) {
+// A table's deviations are those of the population. The options split them into the errors that a
+// person's depths share and the rest. Conditioned on known depths of this person, the deviations
+// are the depths' own.
+TableDepthOptions SplitTableError(const TableDepthOptions& table, const Experiment& experiment) {
   return IsConditioned(experiment.tissue) ? TableDepthOptions{.own = 1, .shared = 0} : table;
 }
 
@@ -323,7 +366,7 @@ MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceIn
                         const RunContext& context) {
   const LoadedPrior& prior = *in.prior;
   const std::vector<Dowel>& dowels = in.subject.dowels_on_bone;
-  const TableDepthOptions parts = PartsOf(use.table_depths, in.experiment);
+  const TableDepthOptions parts = SplitTableError(use.table_depths, in.experiment);
   const TableDepthOptions* const table =
       in.experiment.tissue.depths == DepthSource::kTable ? &parts : nullptr;
   const TriMesh* const implicit = in.implicit.triangles.empty() ? nullptr : &in.implicit;
@@ -335,9 +378,9 @@ MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceIn
     target.surface_sd_mm = std::move(spread.sd);
     target.surface_error_mm = std::move(spread.error);
   }
-  RuleMarks rules = RulesOf(in, prior.face);
+  RuleMarks rules = ApplySubjectRules(in, prior.face);
   target.marks = std::move(rules.marks);
-  target.draws = DrawsOf(use, in.experiment.uncertainty);
+  target.draws = ListDraws(use, in.experiment.uncertainty);
   target.tells_spread = in.tells_sigma || !target.draws.empty();
   ShapeEstimate shape = Estimate(prior.face, use, target, context);
   for (std::size_t k = 0; k < rules.rules.size(); ++k) {
@@ -349,14 +392,19 @@ MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceIn
   placed.face_from_template =
       Composed(shape.subject_from_model, prior.on_template.mean_from_template);
   placed.face = InSubjectFrame(in.generic, placed.face_from_template);
-  placed.face.surface = SurfaceOf(shape, prior.face, prior.on_template, in.generic.surface.shape());
+  placed.face.surface =
+      MakeFaceSurface(shape, prior.face, prior.on_template, in.generic.surface.shape());
   FaceFit unfitted = Unfitted(placed.face.surface, placed.dowels);
   unfitted.fit.usable = shape.usable;
   return {std::move(placed), std::move(unfitted), std::move(shape), std::move(rules.rules)};
 }
 
+// ---------------------------------------------------------------------------------------------
+// The ways to a face
+// ---------------------------------------------------------------------------------------------
+
 MadeFace MakeFace(const AutoFace&, PlacedTemplate, const FaceInput&, const RunContext&) {
-  throw std::logic_error("WayToFace has no auto");
+  throw std::logic_error("WayToFace never returns auto");
 }
 
 MadeFace MakeFace(const PlacedFace&, PlacedTemplate placed, const FaceInput&, const RunContext&) {
@@ -383,12 +431,12 @@ MadeFace MakeFace(const ReferenceFace& o, PlacedTemplate placed, const FaceInput
 
 MadeFace MakeFace(const FittedTemplate&, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
-  FaceFit fitted = FitFace(in.experiment, placed, in, {}, context);
+  FaceFit fitted = FitFace(PlanFit(in.experiment), placed, in, {}, context);
   return {std::move(placed), std::move(fitted), {}};
 }
 
-// Where the estimate met the dowels: at the prior's own sites, whatever `sites` says of them, and
-// elsewhere at the point of the face that is nearest to the tip.
+// Sets the (u,v) in which the estimate met the dowels. At the prior's sites they are the prior's,
+// whatever `sites` states. Elsewhere they are those of the point of the face nearest to the tip.
 void MeetDowels(const LoadedPrior& prior, MadeFace& made) {
   const std::map<std::string, Vec2>& own = made.placed.face.site_uv;
   for (std::size_t k = 0; k < made.fitted.target.points.size(); ++k) {
@@ -411,13 +459,13 @@ MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in
   return made;
 }
 
-// By how much the tips' variance exceeds that of measured depths: a fit weighs its points among
-// themselves alone.
+// The ratio of the tips' variance to that of measured depths. A fit weighs its points only against
+// each other, so its other terms must grow by this ratio.
 double TipVarianceRatio(const PriorThenFit& o, const FaceInput& in) {
   if (in.experiment.tissue.depths != DepthSource::kTable) {
     return 1;
   }
-  const TableDepthOptions parts = PartsOf(o.use.table_depths, in.experiment);
+  const TableDepthOptions parts = SplitTableError(o.use.table_depths, in.experiment);
   const double measured = std::pow(o.use.estimate.tip_normal_sd_mm, 2);
   double sum = 0;
   for (const Dowel& dowel : in.subject.dowels_on_bone) {
@@ -426,18 +474,18 @@ double TipVarianceRatio(const PriorThenFit& o, const FaceInput& in) {
   return static_cast<double>(in.subject.dowels_on_bone.size()) / sum;
 }
 
-// The experiment with what a fit on top of the prior's face does otherwise.
-Experiment OnPrior(const PriorThenFit& o, const FaceInput& in) {
-  Experiment experiment = in.experiment;
-  experiment.first_fit.clear();  // seeds are taken on the prior's face
-  experiment.seeds.weight = o.seed_weight;
-  std::vector<Term>& terms = experiment.fit.terms;
+// The plan of a fit that starts from the prior's face.
+FitPlan PlanFitOnPrior(const PriorThenFit& o, const FaceInput& in) {
+  FitPlan plan = PlanFit(in.experiment);
+  plan.first_fit.clear();  // seeds are taken on the prior's face
+  plan.seeds.weight = o.seed_weight;
+  std::vector<Term>& terms = plan.fit.terms;
   const bool named = std::ranges::any_of(
       terms, [](const Term& term) { return std::holds_alternative<PriorShapeTerm>(term); });
   if (!named) {
     terms.emplace_back(PriorShapeTerm{.weight = o.shape_weight * TipVarianceRatio(o, in)});
   }
-  return experiment;
+  return plan;
 }
 
 MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput& in,
@@ -450,10 +498,10 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
     }
   }
   const PriorKnowledge known{
-      .shape = ShapePointsOf(surface, *made.prior, in.prior->face, in.prior->on_template),
+      .shape = SampleShape(surface, *made.prior, in.prior->face, in.prior->on_template),
       .features = FeaturesOn(*made.prior, in.prior->face),
       .trust = &o.seed_trust};
-  made.fitted = FitFace(OnPrior(o, in), made.placed, in, known, context);
+  made.fitted = FitFace(PlanFitOnPrior(o, in), made.placed, in, known, context);
   TakeDraws(o.use, *in.prior, made);
   return made;
 }
@@ -490,23 +538,24 @@ MadeFace MakeFace(const FaceInput& in, const RunContext& context) {
                     WayToFace(in.experiment));
 }
 
-void MeasureResiduals(FaceFit& fitted) {
-  FitResult& fit = fitted.fit;
-  double all = 0, weight = 0, of_dowels = 0, dowel_weight = 0;
-  fit.residual_mm.clear();
-  for (std::size_t k = 0; k < fitted.target.points.size(); ++k) {
-    const FitPoint& point = fitted.target.points[k];
-    fit.residual_mm.push_back((fit.surface.Point(fit.uv[k]) - point.position).norm());
-    const double squared = point.weight * fit.residual_mm[k] * fit.residual_mm[k];
-    all += squared;
-    weight += point.weight;
-    if (point.role != PointRole::kSeed) {
-      of_dowels += squared;
-      dowel_weight += point.weight;
-    }
+std::optional<HSplineSurface> EditByHand(const Experiment& experiment, MadeFace& made,
+                                         Case& subject) {
+  if (experiment.edits.empty()) {
+    return std::nullopt;
   }
-  fit.point_rms_mm = std::sqrt(all / weight);
-  fit.dowel_rms_mm = std::sqrt(of_dowels / dowel_weight);
+  const EditScript script = ReadEditScript(experiment.edits);
+  HSplineSurface before = made.fitted.fit.surface;
+  ApplyEdits(script, made.fitted.fit.surface);
+  for (HSplineSurface& sample : made.samples) {
+    ApplyEdits(script, sample);
+  }
+  MeasureResiduals(made.fitted);
+  subject.inputs.push_back(experiment.edits);
+  subject.notes.push_back(
+      fmt::format("the face was changed by hand: {} vertices and {} parts of it, by {}; what is "
+                  "measured is the changed face",
+                  script.edits.size(), script.resets.size(), experiment.edits.filename().string()));
+  return before;
 }
 
 FaceUncertainty PriorUncertainty(const UncertaintyOptions& options, const LoadedPrior& prior,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// From a generic face, depths and the implicit face to the subject's face: the ways of
+// Makes the subject's face from a generic face, depths and the implicit face, in the ways of
 // face_source.h.
 #pragma once
 
@@ -14,7 +14,7 @@
 #include "problems/pipeline/experiment.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/pipeline/uncertainty.h"
-#include "problems/prior/prior_surface.h"
+#include "problems/prior/hspline_prior.h"
 #include "surfaces/mesh/cut_planes.h"
 
 namespace semblance {
@@ -32,52 +32,55 @@ struct FaceFit {
   FitResult fit;
 };
 
-// A prior, laid on the template of its mean.
+// A prior that was laid on the template of its mean.
 struct LoadedPrior {
   FacePrior face;
   PriorOnTemplate on_template;
 };
 
-// What faces are made of. All of it must outlive the call.
+// The input of MakeFace, which must outlive the call.
 struct FaceInput {
   const Experiment& experiment;
   const TemplateFace& generic;
-  const LoadedPrior* prior;  // null without one
+  const LoadedPrior* prior;  // null: none
   const Case& subject;
-  const TriMesh&
-      implicit;  // what of it may be seeded; without triangles: `prior` takes the tips alone
+  const TriMesh& implicit;  // the seedable part; without triangles a prior uses the tips alone
   const TriMesh& shell;
-  bool tells_sigma = true;  // of a prior's face; a quick look does without
+  bool tells_sigma = true;  // false: a prior's face gets no sigma, which saves time
 };
 
 struct MadeFace {
   PlacedTemplate placed;
   FaceFit fitted;
-  std::optional<ShapeEstimate> prior;        // where a prior was asked
-  std::vector<AppliedRule> rules = {};       // that took part in it
-  std::vector<HSplineSurface> samples = {};  // drawn beside it: uncertainty.samples
+  std::optional<ShapeEstimate> prior;        // only if the face uses the prior
+  std::vector<AppliedRule> rules = {};       // the rules that took part in the estimate
+  std::vector<HSplineSurface> samples = {};  // uncertainty.samples random faces
 };
 
-// The prior of the experiment, laid on its template; null where no face asks it. Throws as
-// LoadPrior and LayOnTemplate.
+// The prior of the experiment, laid on its template; null if its face does not use one. Throws as
+// LoadPrior and LayOnTemplate do.
 std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
                                               const TemplateFace& generic, StageCache& cache,
                                               const RunContext& context);
 
-// What of the implicit face may be seeded. cuts: the planes where the scan ends; near one its
-// surface is the rim and the lid of the shell, not a face. Notes each such plane with the subject.
+// The part of the implicit face that may be seeded. cuts: the planes at which the scan ends. Near
+// them the implicit face follows the rim and the lid of the shell and is no face. Adds a note for
+// each.
 TriMesh SeedableFace(const Experiment& experiment, std::span<const CutPlane> cuts,
                      const TriMesh& implicit, Case& subject);
 
-// Brings the generic face to the dowels and makes the subject's face of it, as experiment.face
-// says. Throws InputError as Fit and EstimateShape do; Cancelled.
+// Brings the generic face to the dowels and makes the subject's face in the way of experiment.face.
+// Throws InputError as Fit and EstimateShape do, and Cancelled.
 MadeFace MakeFace(const FaceInput& in, const RunContext& context);
 
-// Residuals and their RMS, weighted as those of a fit, of a surface that was changed after it.
-void MeasureResiduals(FaceFit& fitted);
+// Replays experiment.edits on the face and on its samples, if there is an edit script. Updates the
+// residuals, and adds the script to the subject's notes and inputs. Returns the face before the
+// edits; none without a script. Throws as ReadEditScript and ApplyEdits do.
+std::optional<HSplineSurface> EditByHand(const Experiment& experiment, MadeFace& made,
+                                         Case& subject);
 
-// The posterior's sigma, which knows the discrepancy of the model, in place of the fit's; and its
-// samples. made: with a prior.
+// Sigma and samples of a face that was made with a prior. Sigma is the posterior's, which includes
+// the discrepancy of the model, in place of the fit's.
 FaceUncertainty PriorUncertainty(const UncertaintyOptions& options, const LoadedPrior& prior,
                                  const MadeFace& made, const Tessellation& face);
 

@@ -15,7 +15,7 @@ struct Remedy {
   std::string_view step, what;
 };
 
-// What makes a step need less.
+// Remedies that reduce the memory of a step.
 constexpr std::array kRemedies = {
     Remedy{"load subject", "give meshes or a volume with fewer elements"},
     Remedy{"fill skull", "give a skull with fewer triangles"},

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Runs the named steps of a long job and notes how long each took.
+// Runs the named steps of a long job and records the duration of each.
 #pragma once
 
 #include <chrono>
@@ -25,8 +25,8 @@ class StepClock {
  public:
   explicit StepClock(const RunContext& context) : context_(context) {}
 
-  // What step() returns. Reports the name first; throws Cancelled if a stop was requested, and
-  // OutOfMemory, with what to ask for instead, where step() needs more than there is.
+  // Reports the name, then returns step(). Throws Cancelled if a stop was requested. Throws
+  // OutOfMemory, with a remedy, if step() needs more memory than there is.
   template <class Step>
   auto operator()(const char* name, Step&& step) {
     context_.ThrowIfStopped();
@@ -46,7 +46,7 @@ class StepClock {
       return step();
     } catch (const std::bad_alloc&) {
       ThrowOutOfMemory(name);
-    } catch (const std::length_error&) {  // more than any memory
+    } catch (const std::length_error&) {  // the size exceeds any memory
       ThrowOutOfMemory(name);
     }
   }

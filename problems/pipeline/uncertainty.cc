@@ -8,7 +8,7 @@
 #include "interp/kriging/kriging_process.h"
 #include "problems/conditional/condition_depths.h"
 #include "problems/pipeline/uncertainty.h"
-#include "problems/prior/depth_spread.h"
+#include "problems/prior/prior_observations.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -16,8 +16,7 @@
 namespace semblance {
 namespace {
 
-// The depth behind a point of the fit: where on the skull it stands, and how uncertain the dowels
-// make it.
+// The depth behind a point of the fit: its place on the skull, and its uncertainty by the dowels.
 struct DepthBehind {
   Vec3 base = Vec3::Constant(kNaN);
   double dowels_sd_mm = 0;
@@ -28,19 +27,19 @@ bool FromTable(const Experiment& experiment) {
   return experiment.tissue.depths == DepthSource::kTable;
 }
 
-// With the deviation that their source states, else the option's, else the published one.
+// The dowels with the deviation that their source states, else the option's, else the published
+// one.
 std::vector<Dowel> WithSd(std::vector<Dowel> dowels, const Experiment& experiment) {
-  const double otherwise_mm = experiment.uncertainty.dowel_sd_mm;
+  const double option_mm = experiment.uncertainty.dowel_sd_mm;
   for (Dowel& dowel : dowels) {
     if (!std::isfinite(dowel.sd_mm)) {
-      dowel.sd_mm =
-          FromTable(experiment) && otherwise_mm == 0 ? PublishedSd_mm(dowel) : otherwise_mm;
+      dowel.sd_mm = FromTable(experiment) && option_mm == 0 ? PublishedSd_mm(dowel) : option_mm;
     }
   }
   return dowels;
 }
 
-// The dowels' own, by inverse squared distance.
+// The dowels' deviations, weighted by inverse squared distance.
 double SdNear(std::span<const Dowel> dowels, const Vec3& p) {
   double sum = 0, weights = 0;
   for (const Dowel& dowel : dowels) {
@@ -60,7 +59,8 @@ std::int32_t NearestCorner(const TriMesh& shell, const MeshPoint& at) {
   });
 }
 
-// The deviations of these hold what lies between dowels, too, which kriging states here.
+// True if the scheme's deviations cover the dowels' errors alone. The deviations of the two other
+// schemes also cover the error between dowels, which kriging states here already.
 bool StatesDowelsAlone(const Experiment& experiment) {
   return !std::holds_alternative<SurfaceMatern>(experiment.interp) &&
          !std::holds_alternative<AutoScheme>(experiment.interp);
@@ -100,7 +100,7 @@ void AddSmoothErrors(std::span<const DepthBehind> depths, const std::vector<doub
   }
 }
 
-// What the scheme's depths are off from the likeliest ones: known, but taken as one deviation.
+// Adds the difference of the scheme's depths from the likeliest ones, taken as one deviation.
 void AddKnownError(std::span<const DepthBehind> depths, const Eigen::VectorXd& likeliest_mm,
                    Eigen::MatrixXd& covariance) {
   Eigen::VectorXd off(likeliest_mm.size());
@@ -111,7 +111,8 @@ void AddKnownError(std::span<const DepthBehind> depths, const Eigen::VectorXd& l
   covariance += off * off.transpose();
 }
 
-// What a person's depths have in common, of a table's; and the rest of their deviations.
+// The deviations of a table's depths, split into the error that all depths of a person share and
+// the rest.
 struct SplitDeviations {
   Eigen::VectorXd shared_mm;
   std::vector<double> own_mm;
@@ -130,10 +131,10 @@ SplitDeviations Split(const Experiment& experiment, std::span<const DepthBehind>
   return split;
 }
 
-// Of the points' depths, mm^2; what kriging found goes into the result.
-Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& input,
-                            std::span<const DepthBehind> depths, FaceUncertainty& result,
-                            const RunContext& context) {
+// The covariance of the points' depths, mm^2. Sets the parameters of kriging in the result.
+Eigen::MatrixXd DepthCovariance(const Experiment& experiment, const DepthInput& input,
+                                std::span<const DepthBehind> depths, FaceUncertainty& result,
+                                const RunContext& context) {
   const auto* const own = std::get_if<Kriging>(&experiment.interp);
   Kriging kriging = own == nullptr ? Kriging{.nugget_share = 0} : *own;
   const DepthProcess model = FitKriging(kriging, input, context);
@@ -153,14 +154,14 @@ Eigen::MatrixXd DepthErrors(const Experiment& experiment, const DepthInput& inpu
   return std::move(posterior.covariance);
 }
 
-PointErrors ErrorsOf(const Experiment& experiment, const DepthStage& stage,
-                     const HSplineSurface& surface, const FitTarget& target,
-                     FaceUncertainty& result, const RunContext& context) {
+PointErrors FindPointErrors(const Experiment& experiment, const DepthStage& stage,
+                            const HSplineSurface& surface, const FitTarget& target,
+                            FaceUncertainty& result, const RunContext& context) {
   const std::vector<Dowel> dowels = WithSd(stage.dowels_on_shell, experiment);
   const DepthInput input{stage.shell, stage.normals, dowels, stage.subject.network,
                          stage.expected_on_shell};
   const std::vector<DepthBehind> depths = DepthsBehind(experiment, target, stage, dowels, context);
-  Eigen::MatrixXd covariance = DepthErrors(experiment, input, depths, result, context);
+  Eigen::MatrixXd covariance = DepthCovariance(experiment, input, depths, result, context);
   PointErrors errors;
   std::vector<double> laid_mm;  // seeds alone
   for (const FitPoint& point : target.points) {
@@ -183,14 +184,14 @@ int FinestLevel(const FitResult& fit) {
   return finest;
 }
 
-FitTarget AsLeft(FitTarget target, const FitResult& fit) {
+FitTarget WithFinalUv(FitTarget target, const FitResult& fit) {
   for (std::size_t k = 0; k < target.points.size(); ++k) {
     target.points[k].uv = fit.uv[k];
   }
   return target;
 }
 
-// The generic face's own misfit, which grows away from the points.
+// Adds the generic face's own misfit, which grows away from the points.
 void AddTemplateMisfit(const UncertaintyOptions& o, const Tessellation& face,
                        const HSplineSurface& surface, const FitTarget& target,
                        std::vector<double>& sigma_mm, const RunContext& context) {
@@ -208,7 +209,7 @@ void AddTemplateMisfit(const UncertaintyOptions& o, const Tessellation& face,
   });
 }
 
-// Sigma where a point of the fit lies in the same patch of its finest level, else NaN.
+// Sigma at the vertices that share a patch of the finest level with a point of the fit, else NaN.
 std::vector<double> WhereHeld(const std::vector<double>& sigma_mm, const std::vector<Vec2>& uv,
                               const FitTarget& target, const HSplineShape& shape, int level) {
   const int across = shape.PatchesU(level), up = shape.PatchesV(level);
@@ -233,11 +234,12 @@ FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& 
                                 const FittedFace& fitted, const RunContext& context) {
   const UncertaintyOptions& options = experiment.uncertainty;
   const HSplineSurface& surface = fitted.fit.surface;
-  const FitTarget target = AsLeft(fitted.target, fitted.fit);
+  const FitTarget target = WithFinalUv(fitted.target, fitted.fit);
   const int level = FinestLevel(fitted.fit);
   FaceUncertainty result;
-  const ErrorPropagation spread(surface, fitted.rest, target, level, experiment.fit.terms,
-                                ErrorsOf(experiment, stage, surface, target, result, context));
+  const ErrorPropagation spread(
+      surface, fitted.rest, target, level, experiment.fit.terms,
+      FindPointErrors(experiment, stage, surface, target, result, context));
   for (const std::string_view name : spread.left_out()) {
     result.left_out.emplace_back(name);
   }
@@ -258,8 +260,8 @@ FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& 
 
 namespace {
 
-double CoverageOfPart(const TrueSkin& skin, int part, std::vector<double> sigma,
-                      const std::vector<double>& areas) {
+double CoverPart(const TrueSkin& skin, int part, std::vector<double> sigma,
+                 const std::vector<double>& areas) {
   for (std::size_t v = 0; v < sigma.size(); ++v) {
     sigma[v] = skin.part[v] == part ? sigma[v] : kNaN;
   }
@@ -293,7 +295,7 @@ SigmaCoverage MeasureCoverage(const TrueSkin& skin, const TriMesh& face,
   }
   coverage.scores = ScoreDepths(errors, sigma, areas);
   for (std::size_t part = 0; !skin.part.empty() && part < kFaceParts.size(); ++part) {
-    const double share = CoverageOfPart(skin, static_cast<int>(part), sigma, areas);
+    const double share = CoverPart(skin, static_cast<int>(part), sigma, areas);
     if (std::isfinite(share)) {
       coverage.of_part[kFaceParts[part]] = share;
     }

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "problems/face_template/skin_matcher.h"
+#include "problems/face_template/skin_distance.h"
 #include "problems/face_template/template_placement.h"
 #include "problems/subject/average_skull.h"
 #include "problems/subject/sites.h"

@@ -18,7 +18,7 @@ struct SkullGrid {
 
 // The generic head is bent by a thin plate so that its sites lie on the skull's landmarks
 // (template_placement.h); each cell's middle then goes to the bone that belongs to it
-// (skin_matcher.h), within reach_mm. So cells of one (u,v) correspond at the sites, and between
+// (skin_distance.h), within reach_mm. So cells of one (u,v) correspond at the sites, and between
 // them as the plate lets them. The normal is the mean of the skull's, by area, within
 // normal_radius_mm. skull: what is seen of it from outside. Throws InputError if there are fewer
 // than four landmarks of standard sites, or all in a plane.

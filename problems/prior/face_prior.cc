@@ -22,9 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr double kFarthestFromMean_mm = 5;       // of sites and landmarks from the mean
-constexpr int kFirstUsed = 28, kLandmarks = 68;  // Multi-PIE; before: outline and brows
-// RMS of the largest mode. Faces have some mm; the bounds are a factor of 1000 apart, so that no
-// model is within them in two units of m, mm and um.
+constexpr int kFirstUsed = 28, kLandmarks = 68;  // of Multi-PIE; 1 to 27 are outline and brows
+// Bounds of the RMS of the largest mode, which is some mm for faces. They are a factor of 1000
+// apart, so that no model lies within them in two of the units m, mm and um.
 constexpr double kLeastMode_mm = 0.05, kMostMode_mm = 50;
 
 const fs::path& Named(const fs::path& path, const char* option) {
@@ -46,8 +46,8 @@ TriMesh ReadMean(const fs::path& path) {
   return ReadMesh(path);
 }
 
-// The array as the model has it: a column per mode.
-Eigen::MatrixXd ModesOfArray(const ModesPrior& source, std::size_t points) {
+// Returns one column per mode.
+Eigen::MatrixXd ReadModesArray(const ModesPrior& source, std::size_t points) {
   const NpyArray array = ReadNpy(source.modes);
   const std::string name = source.modes.string();
   if (array.shape.size() != 3 || array.shape[2] != 3) {
@@ -71,11 +71,11 @@ Eigen::MatrixXd ModesOfArray(const ModesPrior& source, std::size_t points) {
 }
 
 bool IsFolder(const fs::path& path) {
-  std::error_code ignored;  // what cannot be read is told by who reads it
+  std::error_code ignored;  // whoever reads the path reports the error
   return fs::is_directory(path, ignored);
 }
 
-std::vector<fs::path> RegularFilesIn(const fs::path& folder) {
+std::vector<fs::path> ListRegularFiles(const fs::path& folder) {
   std::vector<fs::path> files;
   try {
     for (const auto& entry : fs::directory_iterator(folder)) {
@@ -90,11 +90,11 @@ std::vector<fs::path> RegularFilesIn(const fs::path& folder) {
   return files;
 }
 
-// The first `count`, by name. Files that are no mesh, such as the materials of an OBJ, are no
-// modes; hidden ones neither.
-std::vector<fs::path> MeshesIn(const fs::path& folder, int count) {
+// The first `count` meshes, by name. Hidden files and files that are no mesh, such as the materials
+// of an OBJ, are skipped.
+std::vector<fs::path> FindMeshes(const fs::path& folder, int count) {
   std::vector<fs::path> meshes;
-  for (const fs::path& file : RegularFilesIn(folder)) {
+  for (const fs::path& file : ListRegularFiles(folder)) {
     const std::string ending = LowerCase(file.extension().string());
     const bool hidden = file.filename().string().starts_with('.');
     if (ending == ".stl" && !hidden) {
@@ -116,8 +116,8 @@ std::vector<fs::path> MeshesIn(const fs::path& folder, int count) {
   return meshes;
 }
 
-void CheckOfMean(const TriMesh& mesh, const fs::path& file, const TriMesh& mean,
-                 const fs::path& mean_file) {
+void CheckSameMesh(const TriMesh& mesh, const fs::path& file, const TriMesh& mean,
+                   const fs::path& mean_file) {
   if (mesh.points.size() != mean.points.size()) {
     throw InputError(
         fmt::format("{}: a mesh of {} points, and {} has {}; a mode is the mean's own "
@@ -132,48 +132,48 @@ void CheckOfMean(const TriMesh& mesh, const fs::path& file, const TriMesh& mean,
   }
 }
 
-double RmsOfMode_mm(const Eigen::VectorXd& mode) {
+double ModeRms_mm(const Eigen::VectorXd& mode) {
   return mode.stableNorm() / std::sqrt(static_cast<double>(mode.size()) / 3);
 }
 
-Eigen::VectorXd ModeOfMesh(const fs::path& file, const TriMesh& mean, const fs::path& mean_file) {
-  constexpr double kTextRounding_mm = 0.001;  // of a text file with three digits
+Eigen::VectorXd ReadModeMesh(const fs::path& file, const TriMesh& mean, const fs::path& mean_file) {
+  constexpr double kTextRounding_mm = 0.001;  // rounding of a text file with three decimals
   const TriMesh mesh = ReadMesh(file);
-  CheckOfMean(mesh, file, mean, mean_file);
+  CheckSameMesh(mesh, file, mean, mean_file);
   Eigen::VectorXd mode(3 * std::ssize(mean.points));
   for (std::size_t v = 0; v < mean.points.size(); ++v) {
     mode.segment<3>(3 * static_cast<Eigen::Index>(v)) = mesh.points[v] - mean.points[v];
   }
-  if (RmsOfMode_mm(mode) <= kTextRounding_mm) {
+  if (ModeRms_mm(mode) <= kTextRounding_mm) {
     throw InputError(fmt::format("{}: it is the mean, and so no mode; take it out of the folder",
                                  file.string()));
   }
   return mode;
 }
 
-Eigen::MatrixXd ModesOfFolder(const ModesPrior& source, const TriMesh& mean) {
+Eigen::MatrixXd ReadModesFolder(const ModesPrior& source, const TriMesh& mean) {
   if (source.scale != 1) {
     throw InputError(
         fmt::format("{}: the modes are a folder of meshes, which are in mm, and the scale is "
                     "{:.6g}; leave it out",
                     source.modes.string(), source.scale));
   }
-  const std::vector<fs::path> meshes = MeshesIn(source.modes, source.count);
+  const std::vector<fs::path> meshes = FindMeshes(source.modes, source.count);
   Eigen::MatrixXd modes(3 * std::ssize(mean.points), std::ssize(meshes));
   for (std::size_t k = 0; k < meshes.size(); ++k) {
-    modes.col(static_cast<Eigen::Index>(k)) = ModeOfMesh(meshes[k], mean, source.mean);
+    modes.col(static_cast<Eigen::Index>(k)) = ReadModeMesh(meshes[k], mean, source.mean);
   }
   return modes;
 }
 
 Eigen::MatrixXd ReadModes(const ModesPrior& source, const TriMesh& mean) {
-  return IsFolder(Named(source.modes, "modes")) ? ModesOfFolder(source, mean)
-                                                : ModesOfArray(source, mean.points.size());
+  return IsFolder(Named(source.modes, "modes")) ? ReadModesFolder(source, mean)
+                                                : ReadModesArray(source, mean.points.size());
 }
 
-bool IsSizeOfMode(double rms_mm) { return rms_mm >= kLeastMode_mm && rms_mm <= kMostMode_mm; }
+bool IsPlausibleMode(double rms_mm) { return rms_mm >= kLeastMode_mm && rms_mm <= kMostMode_mm; }
 
-// The scale that would bring the largest mode into range, where a unit was mistaken.
+// If a mistaken unit explains the size of the largest mode, states the scale that corrects it.
 std::string ScaleRemedy(const ModesPrior& source, double rms_mm) {
   if (IsFolder(source.modes)) {
     return "its meshes must be in mm and in the frame of the mean";
@@ -182,7 +182,7 @@ std::string ScaleRemedy(const ModesPrior& source, double rms_mm) {
     return "give modes that move points";
   }
   for (const double factor : {0.001, 1000.0}) {
-    if (IsSizeOfMode(factor * rms_mm)) {
+    if (IsPlausibleMode(factor * rms_mm)) {
       return fmt::format("a scale of {:.6g} would make it {:.3g} mm", factor * source.scale,
                          factor * rms_mm);
     }
@@ -190,17 +190,17 @@ std::string ScaleRemedy(const ModesPrior& source, double rms_mm) {
   return fmt::format("correct the scale, which is {:.6g}, or the modes", source.scale);
 }
 
-// The largest mode of a population of faces is of some millimetres.
+// The largest mode of a population of faces moves points by some millimetres.
 void CheckSize(const ModesPrior& source, const Eigen::MatrixXd& modes) {
   Eigen::Index largest = 0;
   double rms_mm = 0;
   for (Eigen::Index k = 0; k < modes.cols(); ++k) {
-    if (const double rms = RmsOfMode_mm(modes.col(k)); rms > rms_mm) {
+    if (const double rms = ModeRms_mm(modes.col(k)); rms > rms_mm) {
       rms_mm = rms;
       largest = k;
     }
   }
-  if (!IsSizeOfMode(rms_mm)) {
+  if (!IsPlausibleMode(rms_mm)) {
     throw InputError(fmt::format(
         "{}: the largest mode, number {}, moves the points by {:.3g} mm (RMS), and {} to {} mm are "
         "allowed; {}",
@@ -240,10 +240,10 @@ std::map<std::string, ModelPoint> ReadSites(const ModesPrior& source, const TriM
   return sites;
 }
 
-// How far from its landmarks a feature reaches: nose, eyes, mouth.
-double ClearanceOf(int multipie) { return multipie <= 36 ? 14 : multipie <= 48 ? 15 : 16; }
+// The radius (mm) around a landmark that belongs to its feature: nose, eyes or mouth.
+double FindClearance(int multipie) { return multipie <= 36 ? 14 : multipie <= 48 ? 15 : 16; }
 
-int MultiPieOf(const CsvReader& table, std::size_t column) {
+int ReadMultiPieNumber(const CsvReader& table, std::size_t column) {
   const double value = table.Number(column);
   if (!(value >= 1 && value <= kLandmarks && value == std::round(value))) {
     table.Fail(
@@ -254,7 +254,7 @@ int MultiPieOf(const CsvReader& table, std::size_t column) {
   return static_cast<int>(value);
 }
 
-// Rules find the features by their number, so all must be there.
+// Rules find the features by their number, so all must be present.
 void RequireUsed(const std::map<int, Vec3>& landmarks, const std::string& name) {
   std::vector<int> missing;
   for (int n = kFirstUsed; n <= kLandmarks; ++n) {
@@ -280,7 +280,7 @@ std::map<int, Vec3> ReadMultiPie(const ModesPrior& source, const TriMesh& mean) 
   const MeshQuery query(mean);
   std::map<int, Vec3> landmarks;
   while (table.NextRow()) {
-    const int n = MultiPieOf(table, number);
+    const int n = ReadMultiPieNumber(table, number);
     const Vec3 at(table.Number(x), table.Number(y), table.Number(z));
     if (!landmarks.emplace(n, at).second) {
       table.Fail(fmt::format("landmark {} appears twice; keep one of the two", n));
@@ -293,12 +293,12 @@ std::map<int, Vec3> ReadMultiPie(const ModesPrior& source, const TriMesh& mean) 
   return landmarks;
 }
 
-// By number, whatever the order of the rows.
+// Returns the features by number, whatever the order of the rows.
 std::vector<ShapeFeature> ReadFeatures(const ModesPrior& source, const TriMesh& mean) {
   std::vector<ShapeFeature> features;
   for (const auto& [number, position] : ReadMultiPie(source, mean)) {
     if (number >= kFirstUsed) {
-      features.push_back({position, ClearanceOf(number)});
+      features.push_back({position, FindClearance(number)});
     }
   }
   return features;
@@ -320,7 +320,7 @@ FacePrior LoadPrior(const ModesPrior& source) {
 std::vector<fs::path> ModesPriorFiles(const ModesPrior& source) {
   std::vector<fs::path> files = {source.mean, source.sites, source.features};
   const std::vector<fs::path> modes =
-      IsFolder(source.modes) ? MeshesIn(source.modes, source.count) : std::vector{source.modes};
+      IsFolder(source.modes) ? FindMeshes(source.modes, source.count) : std::vector{source.modes};
   files.insert(files.begin() + 1, modes.begin(), modes.end());
   return files;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A statistical model of faces, and which of its points belong to the sites of the skull.
+// A statistical model of faces, with its points at the sites of the skull.
 #pragma once
 
 #include <filesystem>
@@ -22,18 +22,18 @@ void Fields(Visitor&, NoPrior&) {}
 
 struct ModesPrior {
   static constexpr std::string_view kName = "modes";
-  std::filesystem::path mean;      // mesh, LPS, mm
-  std::filesystem::path modes;     // .npy, k x n x 3, or a folder of meshes
-  std::filesystem::path sites;     // .csv: their points on the mean
-  std::filesystem::path features;  // .csv: the 68 facial landmarks
-  double scale = 1;                // mm per unit of an array's modes
-  int count = 100;                 // of modes, at most
+  std::filesystem::path mean;
+  std::filesystem::path modes;
+  std::filesystem::path sites;
+  std::filesystem::path features;
+  double scale = 1;
+  int count = 100;
 };
 template <class Visitor>
 void Fields(Visitor& visit, ModesPrior& o) {
   visit(FieldInfo{.name = "mean",
-                  .doc = "mesh of the mean face: PLY, OBJ or OFF, for an STL has no order of "
-                         "points; mm, LPS"},
+                  .doc = "mesh of the mean face in mm, LPS: PLY, OBJ or OFF (an STL keeps no order "
+                         "of points)"},
         o.mean);
   visit(FieldInfo{.name = "modes",
                   .doc = "NumPy array (.npy) of the modes, k x n x 3, n the points of the mean in "
@@ -44,7 +44,7 @@ void Fields(Visitor& visit, ModesPrior& o) {
         o.modes);
   visit(FieldInfo{.name = "sites",
                   .doc = "CSV file of the sites' points on the mean: columns site, x_mm, y_mm, "
-                         "z_mm; sites that are not there take no part"},
+                         "z_mm; sites that are missing take no part"},
         o.sites);
   visit(
       FieldInfo{.name = "features",
@@ -59,34 +59,34 @@ void Fields(Visitor& visit, ModesPrior& o) {
                   .doc = "mm per unit of the array of modes, e.g. 0.001 where they are in "
                          "micrometres; 1 for a folder of meshes, which are in mm"},
         o.scale);
-  visit(FieldInfo{.name = "count", .min = 1, .max = 10000, .doc = "modes that are used, at most"},
+  visit(FieldInfo{.name = "count", .min = 1, .max = 10000, .doc = "largest number of modes used"},
         o.count);
 }
 
 // The modes of `template` as H-splines.
 struct HSplinePrior {
   static constexpr std::string_view kName = "hspline";
-  std::filesystem::path modes;  // .json of `semblance prior`
-  int count = 100;              // of modes, at most
+  std::filesystem::path modes;
+  int count = 100;
 };
 template <class Visitor>
 void Fields(Visitor& visit, HSplinePrior& o) {
   visit(FieldInfo{.name = "modes",
-                  .doc = "file (.json) of the modes, as `semblance prior` writes it; `template` is "
-                         "the face that it was made for"},
+                  .doc = "file (.json) of the modes, as `semblance prior` writes it; `template` "
+                         "must be the face that it was made for"},
         o.modes);
-  visit(FieldInfo{.name = "count", .min = 1, .max = 10000, .doc = "modes that are used, at most"},
+  visit(FieldInfo{.name = "count", .min = 1, .max = 10000, .doc = "largest number of modes used"},
         o.count);
 }
 
 // The modes of configs/faces/ict, which the program carries, for `template: ict`.
 struct IctPrior {
   static constexpr std::string_view kName = "ict";
-  int count = 60;  // of modes, at most
+  int count = 60;
 };
 template <class Visitor>
 void Fields(Visitor& visit, IctPrior& o) {
-  visit(FieldInfo{.name = "count", .min = 1, .max = 60, .doc = "modes that are used, at most"},
+  visit(FieldInfo{.name = "count", .min = 1, .max = 60, .doc = "largest number of modes used"},
         o.count);
 }
 
@@ -95,18 +95,19 @@ using PriorSource = std::variant<NoPrior, IctPrior, ModesPrior, HSplinePrior>;
 struct FacePrior {
   ShapeModel model;
   std::map<std::string, ModelPoint> sites;  // by site code
-  std::vector<ShapeFeature> features;       // of modes on a mesh: Multi-PIE's 28 to 68, by number
+  std::vector<ShapeFeature> features;       // landmarks 28 to 68 of Multi-PIE, by number
 };
 
-// Throws InputError or IoError in one line: a file that is not named or cannot be read, a mean
-// that is an STL, a mean and modes that disagree, a mesh of a mode that is the mean itself, a
-// largest mode that is not of 0.05 to 50 mm RMS, a site that is none, a landmark that is none,
-// appears twice or is missing, and a site or landmark that lies farther than 5 mm from the mean.
-// For a folder of modes as ModesPriorFiles.
+// Throws InputError or IoError in one line for: a file that is not named or cannot be read, a mean
+// that is an STL, modes that do not fit the mean, a mesh of a mode that equals the mean, a largest
+// mode outside 0.05 to 50 mm RMS, an unknown site, a landmark that is unknown, repeated or missing,
+// a site or landmark more than 5 mm from the mean. For a folder of modes it also throws as
+// ModesPriorFiles does.
 FacePrior LoadPrior(const ModesPrior& source);
 
-// The files that LoadPrior reads: of a folder of modes the first source.count meshes, by name.
-// Throws InputError for a folder without a mesh or with an STL, IoError if it cannot be read.
+// The files that LoadPrior reads. From a folder of modes these are the first source.count meshes,
+// by name. Throws InputError for a folder without a mesh or with an STL, IoError if it cannot be
+// read.
 std::vector<std::filesystem::path> ModesPriorFiles(const ModesPrior& source);
 
 }  // namespace semblance

@@ -15,10 +15,12 @@
 namespace semblance {
 namespace {
 
-constexpr int kFirstFeature = 28, kFeatures = 41;  // Multi-PIE
-constexpr double kEyeBelowMargin = 0.441;          // of the orbit's height
-constexpr double kExophthalmosMm = 16.2;
-constexpr double kCanineShare = 0.758;  // of the mouth's width
+constexpr int kFirstFeature = 28, kFeatures = 41;  // of Multi-PIE
+// The sources of these values are stated with the options.
+constexpr double kEyeBelowMargin = 0.441;  // of the orbit's height
+constexpr double kExophthalmosMm = 16.2;   // mean
+constexpr double kCanineShare = 0.758;     // of the mouth's width
+constexpr double kSubnasaleMm = 13.5;      // in front of ss
 
 // Landmarks of Multi-PIE, by side.
 struct EyeLandmarks {
@@ -35,7 +37,6 @@ struct MouthCorner {
 };
 constexpr MouthCorner kCorners[] = {{"r", 49, -1}, {"l", 55, 1}};
 constexpr int kPronasale = 31, kSubnasale = 34;
-constexpr double kSubnasaleMm = 13.5;
 
 class RuleBook {
  public:
@@ -120,7 +121,7 @@ void RuleBook::MouthWidth(const RuleUse& rule) {
   }
   const double half_mm = (*left - *right).dot(left_) / kCanineShare / 2;
   for (const MouthCorner& corner : kCorners) {
-    // Two errors of this size, one at each corner, make one of sd_mm in the width.
+    // Independent errors of this size at both corners add up to one of sd_mm in the width.
     Add({.rule = "mouth_width",
          .point = fmt::format("ch_{}", corner.side),
          .coordinate = "side",
@@ -158,15 +159,15 @@ void RuleBook::Subnasale(const RuleUse& rule) {
   }
 }
 
-// How far a point is to the left of the middle of an average skull, mm of the subject.
+// The distance of a point to the left of the middle of an average skull, mm of the subject.
 double LeftOfMiddle_mm(const Vec3& p, const Similarity& skull_from_average) {
   return (skull_from_average.rotation * Vec3::UnitX()).dot(p - skull_from_average * Vec3::Zero());
 }
 
-// Empty where the point lies on the side that its name says, or near the middle, whose place is not
-// that well known.
-std::string WrongSide(const std::string& code, const Vec3& p, const Similarity& pose) {
-  constexpr double kMiddle_mm = 5;
+// Empty if the point lies on the side that its name states, or near the middle, whose place is not
+// known well enough.
+std::string DescribeWrongSide(const std::string& code, const Vec3& p, const Similarity& pose) {
+  constexpr double kMiddle_mm = 5;  // closer points are accepted on either side
   const Side side = SideOfSite(code);
   if (side == Side::kMidline) {
     return "";
@@ -187,11 +188,11 @@ struct RuleEntry {
   const char* name;
   const RuleUse& use;
   void (RuleBook::*apply)(const RuleUse&);
-  std::vector<std::string> points;     // of bone that it needs
-  std::vector<std::string> or_points;  // of the other side, where it applies to each by itself
+  std::vector<std::string> points;     // of bone that the rule needs
+  std::vector<std::string> or_points;  // of the other side, if the rule applies to each side alone
 };
 
-std::vector<RuleEntry> EntriesOf(const FeatureRules& rules) {
+std::vector<RuleEntry> ListRules(const FeatureRules& rules) {
   return {
       {"eye_height",
        rules.eye_height,
@@ -205,15 +206,16 @@ std::vector<RuleEntry> EntriesOf(const FeatureRules& rules) {
 }
 
 bool IsOn(const RuleUse& rule) { return rule.use.value_or(/*default_value=*/true); }
-bool IsAskedFor(const RuleUse& rule) { return rule.use.value_or(/*default_value=*/false); }
+bool IsRequested(const RuleUse& rule) { return rule.use.value_or(/*default_value=*/false); }
 
 bool IsRulePoint(const std::string& code) {
   return std::ranges::find(RulePointCodes(), code) != RulePointCodes().end();
 }
 
-// Those of `needed` that are neither among the landmarks nor under rules.points.
-std::vector<std::string> Lacking(const std::vector<std::string>& needed, const FeatureRules& rules,
-                                 const std::map<std::string, Vec3>& landmarks) {
+// The points of `needed` that are neither among the landmarks nor under rules.points.
+std::vector<std::string> FindMissing(const std::vector<std::string>& needed,
+                                     const FeatureRules& rules,
+                                     const std::map<std::string, Vec3>& landmarks) {
   std::vector<std::string> lacking;
   std::ranges::copy_if(needed, std::back_inserter(lacking), [&](const std::string& code) {
     return !landmarks.contains(code) && !rules.points.contains(code);
@@ -221,8 +223,8 @@ std::vector<std::string> Lacking(const std::vector<std::string>& needed, const F
   return lacking;
 }
 
-// Which points are missing, and where they are to be given.
-std::string InWords(std::vector<std::string> lacking) {
+// Names the missing points and the place to give them.
+std::string DescribeMissing(std::vector<std::string> lacking) {
   const auto marked = std::ranges::stable_partition(lacking, &IsRulePoint);
   const std::span<const std::string> given(lacking.begin(), marked.begin());
   std::vector<std::string> words;
@@ -235,22 +237,22 @@ std::string InWords(std::vector<std::string> lacking) {
   return fmt::format("{}", fmt::join(words, " and "));
 }
 
-// Why a rule does not apply, or not on both sides; empty where it does.
-std::string Hindrance(const RuleEntry& rule, const FeatureRules& rules,
-                      const std::map<std::string, Vec3>& landmarks) {
-  std::vector<std::string> lacking = Lacking(rule.points, rules, landmarks);
-  const std::vector<std::string> other = Lacking(rule.or_points, rules, landmarks);
+// The reason why a rule does not apply, or not on both sides. Empty if it does.
+std::string ExplainRule(const RuleEntry& rule, const FeatureRules& rules,
+                        const std::map<std::string, Vec3>& landmarks) {
+  std::vector<std::string> lacking = FindMissing(rule.points, rules, landmarks);
+  const std::vector<std::string> other = FindMissing(rule.or_points, rules, landmarks);
   const bool applies = lacking.empty() || (!rule.or_points.empty() && other.empty());
   lacking.insert(lacking.end(), other.begin(), other.end());
   return lacking.empty() ? ""
-                         : fmt::format("it lacks {}: it {}", InWords(std::move(lacking)),
+                         : fmt::format("it lacks {}: it {}", DescribeMissing(std::move(lacking)),
                                        applies ? "applies to one side alone" : "does not apply");
 }
 
 std::string NoteOnPrior(const FacePrior& prior) {
   return fmt::format(
       "rules: the prior has {} landmarks, and rules need {}, nose, eyes and mouth of Multi-PIE (28 "
-      "to 68): none applies; make the prior anew with all of them",
+      "to 68): none applies; make the prior again with all of them",
       prior.features.size(), kFeatures);
 }
 
@@ -261,30 +263,31 @@ const std::vector<std::string>& RulePointCodes() {
   return codes;
 }
 
-std::vector<OptionFault> FaultsOfRules(const FeatureRules& rules) {
+std::vector<OptionFault> CheckRules(const FeatureRules& rules) {
   std::vector<OptionFault> faults;
   for (const auto& [code, point] : rules.points) {
     if (std::ranges::find(RulePointCodes(), code) == RulePointCodes().end()) {
-      faults.push_back({"points." + code, fmt::format("no rule asks for '{}'; known: {}", code,
+      faults.push_back({"points." + code, fmt::format("no rule needs '{}'; known: {}", code,
                                                       fmt::join(RulePointCodes(), ", "))});
     }
   }
   return faults;
 }
 
-bool AsksForRule(const FeatureRules& rules) {
-  return std::ranges::any_of(EntriesOf(rules),
-                             [](const RuleEntry& rule) { return IsAskedFor(rule.use); });
+bool RequestsRule(const FeatureRules& rules) {
+  return std::ranges::any_of(ListRules(rules),
+                             [](const RuleEntry& rule) { return IsRequested(rule.use); });
 }
 
-std::vector<std::string> MistakesOfRulePoints(const FeatureRules& rules, const MeshQuery& skull,
-                                              const Similarity* skull_from_average,
-                                              const PlaceOptions& options) {
+std::vector<std::string> CheckRulePoints(const FeatureRules& rules, const MeshQuery& skull,
+                                         const Similarity* skull_from_average,
+                                         const PlaceOptions& options) {
   std::vector<std::string> mistakes;
   for (const auto& [code, point] : rules.points) {
     const Vec3 p(point[0], point[1], point[2]);
     const double off_mm = skull.Closest(p).distance_mm;
-    std::string side = skull_from_average == nullptr ? "" : WrongSide(code, p, *skull_from_average);
+    std::string side =
+        skull_from_average == nullptr ? "" : DescribeWrongSide(code, p, *skull_from_average);
     if (!(off_mm <= options.max_distance_mm)) {
       mistakes.push_back(
           fmt::format("rules.points.{}: it is {:.1f} mm from the skull, and at most {} mm are "
@@ -297,8 +300,8 @@ std::vector<std::string> MistakesOfRulePoints(const FeatureRules& rules, const M
   return mistakes;
 }
 
-RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> landmarks,
-                       const Similarity& skull_from_average, const FacePrior& prior) {
+RuleMarks ApplyRules(const FeatureRules& rules, std::map<std::string, Vec3> landmarks,
+                     const Similarity& skull_from_average, const FacePrior& prior) {
   if (!HasMultiPie(prior)) {
     return {};
   }
@@ -306,7 +309,7 @@ RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> la
     landmarks[code] = {p[0], p[1], p[2]};
   }
   RuleBook book(std::move(landmarks), skull_from_average, prior);
-  for (const RuleEntry& rule : EntriesOf(rules)) {
+  for (const RuleEntry& rule : ListRules(rules)) {
     if (IsOn(rule.use)) {
       (book.*rule.apply)(rule.use);
     }
@@ -314,21 +317,21 @@ RuleMarks MarksOfRules(const FeatureRules& rules, std::map<std::string, Vec3> la
   return book.Take();
 }
 
-std::vector<std::string> NotesOnRules(const FeatureRules& rules,
-                                      const std::map<std::string, Vec3>& landmarks, bool is_posed,
-                                      const FacePrior* prior) {
-  const std::vector<RuleEntry> entries = EntriesOf(rules);
+std::vector<std::string> ExplainUnusedRules(const FeatureRules& rules,
+                                            const std::map<std::string, Vec3>& landmarks,
+                                            bool is_posed, const FacePrior* prior) {
+  const std::vector<RuleEntry> entries = ListRules(rules);
   if (prior != nullptr && !HasMultiPie(*prior)) {
     const bool any = std::ranges::any_of(entries, [](const RuleEntry& r) { return IsOn(r.use); });
     return any ? std::vector{NoteOnPrior(*prior)} : std::vector<std::string>();
   }
-  const std::string apart = prior == nullptr ? "the face asks no prior: it does not apply"
+  const std::string apart = prior == nullptr ? "the face uses no prior: it does not apply"
                             : !is_posed      ? "the skull's pose is not known: it does not apply"
                                              : "";
   std::vector<std::string> notes;
   for (const RuleEntry& rule : entries) {
-    const std::string why = apart.empty() ? Hindrance(rule, rules, landmarks) : apart;
-    if (IsAskedFor(rule.use) && !why.empty()) {
+    const std::string why = apart.empty() ? ExplainRule(rule, rules, landmarks) : apart;
+    if (IsRequested(rule.use) && !why.empty()) {
       notes.push_back(fmt::format("rules.{} is on, and {}", rule.name, why));
     }
   }

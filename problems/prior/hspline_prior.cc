@@ -7,20 +7,184 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "fitting/problem/placement.h"
 #include "problems/face_template/ict_face.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
+#include "surfaces/base/parallel.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {
 
+constexpr double kFarthestRmsMm = 5;  // of a template from the mean that it was made from
+
+Similarity PlaceBySites(const FacePrior& prior, const TemplateFace& face) {
+  std::vector<Vec3> on_template, on_mean;
+  for (const auto& [site, at] : prior.sites) {
+    if (const auto uv = face.site_uv.find(site); uv != face.site_uv.end()) {
+      on_template.push_back(face.surface.Point(uv->second));
+      on_mean.push_back(PositionOf(at, prior.model.mean, prior.model.mean.points));
+    }
+  }
+  return PlaceTemplate(on_template, on_mean);
+}
+
+std::vector<MeshPoint> ClosestPoints(const std::vector<Vec3>& points, const Similarity& to_from,
+                                     const MeshQuery& query, const RunContext& context) {
+  std::vector<MeshPoint> closest(points.size());
+  ParallelFor(points.size(), context.threads, 256,
+              [&](std::size_t k) { closest[k] = query.Closest(to_from * points[k]); });
+  return closest;
+}
+
+// Iterated closest points (Besl & McKay 1992), from the similarity of the sites and without far
+// points.
+Similarity PlaceByClosestPoints(const std::vector<Vec3>& samples, Similarity mean_from_template,
+                                const MeshQuery& query, const RunContext& context) {
+  constexpr int kRounds = 10;         // more cost time
+  constexpr double kFarMm = 5;        // pairs that are farther apart do not count
+  constexpr std::size_t kEvery = 29;  // every 29th sample is enough to place the template
+  std::vector<Vec3> some;
+  for (std::size_t k = 0; k < samples.size(); k += kEvery) {
+    some.push_back(samples[k]);
+  }
+  for (int round = 0; round < kRounds; ++round) {
+    std::vector<Vec3> from, to;
+    const std::vector<MeshPoint> closest = ClosestPoints(some, mean_from_template, query, context);
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      if (closest[k].distance_mm < kFarMm) {
+        from.push_back(some[k]);
+        to.push_back(closest[k].position);
+      }
+    }
+    if (from.size() >= 10) {
+      mean_from_template = PlaceTemplate(from, to);
+    }
+  }
+  return mean_from_template;
+}
+
+}  // namespace
+
+Similarity Composed(const Similarity& outer, const Similarity& inner) {
+  Similarity result;
+  result.scale = outer.scale * inner.scale;
+  result.rotation = outer.rotation * inner.rotation;
+  result.translation = outer * inner.translation;
+  return result;
+}
+
+PriorOnTemplate LayOnTemplate(const FacePrior& prior, const TemplateFace& face,
+                              const RunContext& context) {
+  PriorOnTemplate result{.grid = MakeDomainGrid(face.surface.shape()),
+                         .under = {},
+                         .beside = {},
+                         .mean_from_template = {}};
+  std::vector<Vec3> samples(result.grid.size());
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    samples[k] = face.surface.Point(result.grid.UvAt(k));
+  }
+  const MeshQuery query(prior.model.mean);
+  result.mean_from_template =
+      PlaceByClosestPoints(samples, PlaceBySites(prior, face), query, context);
+  double sum = 0;
+  const std::vector<MeshPoint> closest =
+      ClosestPoints(samples, result.mean_from_template, query, context);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    result.under.push_back({closest[k].triangle, closest[k].weights});
+    result.beside.emplace_back(result.mean_from_template * samples[k] - closest[k].position);
+    sum += closest[k].distance_mm * closest[k].distance_mm;
+  }
+  result.rms_mm = std::sqrt(sum / static_cast<double>(samples.size()));
+  if (!(result.rms_mm <= kFarthestRmsMm)) {
+    throw InputError(
+        fmt::format("prior: the template is {:.1f} mm (RMS) from the model's mean; make a template "
+                    "from the mean with `semblance template`",
+                    result.rms_mm));
+  }
+  return result;
+}
+
+HSplineSurface MakeFaceSurface(const ShapeEstimate& estimate, const FacePrior& prior,
+                               const PriorOnTemplate& on_template, const HSplineShape& shape) {
+  const Similarity& place = estimate.subject_from_model;
+  std::vector<Vec3> samples;
+  for (std::size_t k = 0; k < on_template.under.size(); ++k) {
+    samples.emplace_back(PositionOf(on_template.under[k], prior.model.mean, estimate.points) +
+                         place.scale * (place.rotation * on_template.beside[k]));
+  }
+  return SurfaceThrough(shape, on_template.grid, samples);
+}
+
+HSplineSurface MovedAsDrawn(const HSplineSurface& face, const ShapeEstimate& estimate,
+                            std::size_t draw, const FacePrior& prior,
+                            const PriorOnTemplate& on_template) {
+  std::vector<Vec3> moves = estimate.drawn.at(draw), samples;
+  for (std::size_t v = 0; v < moves.size(); ++v) {
+    moves[v] -= estimate.points[v];
+  }
+  for (std::size_t k = 0; k < on_template.under.size(); ++k) {
+    samples.emplace_back(face.Point(on_template.grid.UvAt(k)) +
+                         PositionOf(on_template.under[k], prior.model.mean, moves));
+  }
+  return SurfaceThrough(face.shape(), on_template.grid, samples);
+}
+
+std::vector<double> SigmaAt(std::span<const Vec2> uv, const ShapeEstimate& estimate,
+                            const FacePrior& prior, const PriorOnTemplate& on_template) {
+  std::vector<double> sigma_mm;
+  for (const Vec2& at : uv) {
+    const ModelPoint& under = on_template.under[on_template.grid.NearestTo(at)];
+    const Triangle& t = prior.model.mean.triangles[under.triangle];
+    sigma_mm.push_back(under.weights[0] * estimate.sigma_mm[t[0]] +
+                       under.weights[1] * estimate.sigma_mm[t[1]] +
+                       under.weights[2] * estimate.sigma_mm[t[2]]);
+  }
+  return sigma_mm;
+}
+
+std::vector<ShapePoint> SampleShape(const HSplineSurface& surface, const ShapeEstimate& estimate,
+                                    const FacePrior& prior, const PriorOnTemplate& on_template) {
+  constexpr int kSide = 64;  // two along each side of a patch of level 2 of 16 patches a side
+  std::vector<Vec2> uv;
+  for (int k = 0; k < kSide * kSide; ++k) {
+    uv.emplace_back((k % kSide + 0.5) / kSide, (k / kSide + 0.5) / kSide);
+  }
+  const std::vector<double> sigma_mm = SigmaAt(uv, estimate, prior, on_template);
+  std::vector<ShapePoint> points;
+  for (std::size_t k = 0; k < uv.size(); ++k) {
+    const SurfaceFrame frame = surface.Frame(uv[k]);
+    if (const double area = frame.du.cross(frame.dv).norm(); area > 0) {
+      points.push_back(
+          {.uv = uv[k], .position = surface.Point(uv[k]), .sd_mm = sigma_mm[k], .share = area});
+    }
+  }
+  return points;
+}
+
+std::vector<Sphere> FeaturesOn(const ShapeEstimate& estimate, const FacePrior& prior) {
+  const std::vector<Vec3>& mean = prior.model.mean.points;
+  std::vector<Sphere> features;
+  for (const ShapeFeature& feature : prior.features) {
+    const auto nearest =
+        std::min_element(mean.begin(), mean.end(), [&](const Vec3& a, const Vec3& b) {
+          return (a - feature.position).squaredNorm() < (b - feature.position).squaredNorm();
+        });
+    features.push_back({.center = estimate.points[nearest - mean.begin()],
+                        .radius_mm = estimate.subject_from_model.scale * feature.clearance_mm});
+  }
+  return features;
+}
+
+namespace {
+
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kFormat = "semblance face prior";
-constexpr double kUnitMm = 0.001;
+constexpr double kUnitMm = 0.001;  // of the written numbers
 
 Vec3 ValueAt(const ControlNet& net, const Stencil& stencil) {
   Vec3 sum = Vec3::Zero();
@@ -31,8 +195,8 @@ Vec3 ValueAt(const ControlNet& net, const Stencil& stencil) {
 }
 
 // The displacements of one mode at the samples, in the template's frame.
-std::vector<Vec3> DisplacementsOf(const FacePrior& prior, const PriorOnTemplate& on_template,
-                                  Eigen::Index mode) {
+std::vector<Vec3> SampleMode(const FacePrior& prior, const PriorOnTemplate& on_template,
+                             Eigen::Index mode) {
   const Similarity& place = on_template.mean_from_template;
   std::vector<Vec3> moves;
   for (const ModelPoint& under : on_template.under) {
@@ -96,12 +260,12 @@ HSplineModes ModesFrom(const Json& json) {
     throw InputError(fmt::format("format and version must be \"{}\" and 1", kFormat));
   }
   HSplineModes modes;
-  constexpr int kMost = 4096;  // patches of level 0, as everywhere
+  constexpr int kLimit = 4096;  // keeps the conversion exact; CheckShape checks the shape itself
   const auto whole = [&](const char* key) {
     const Json& value = json.at(key);
-    if (!value.is_number_integer() || value < 0 || value > kMost) {
+    if (!value.is_number_integer() || value < 0 || value > kLimit) {
       throw InputError(fmt::format("{} is {}; it must be a whole number from 0 to {}", key,
-                                   value.dump(), kMost));
+                                   value.dump(), kLimit));
     }
     return value.get<int>();
   };
@@ -128,7 +292,7 @@ HSplineModes ModesFrom(const Json& json) {
 }
 
 // A mesh of the template with about 128 quads along each side.
-Tessellation MeshOf(const TemplateFace& face) {
+Tessellation MakeMesh(const TemplateFace& face) {
   const HSplineShape& shape = face.surface.shape();
   const int patches = std::max(shape.PatchesU(shape.max_level), shape.PatchesV(shape.max_level));
   return Tessellate(face.surface, std::max(1, 128 / patches));
@@ -139,7 +303,7 @@ FacePrior Load(const NoPrior&, const TemplateFace&) {
 }
 
 FacePrior Load(const IctPrior& source, const TemplateFace& face) {
-  return PriorOf(HSplineModesFromJson(IctModes(), "the ICT face's modes"), face, source.count);
+  return MakePrior(HSplineModesFromJson(IctModes(), "the ICT face's modes"), face, source.count);
 }
 
 FacePrior Load(const ModesPrior& source, const TemplateFace&) { return LoadPrior(source); }
@@ -150,17 +314,15 @@ FacePrior Load(const HSplinePrior& source, const TemplateFace& face) {
   }
   const HSplineModes modes =
       HSplineModesFromJson(ReadFileBytes(source.modes), source.modes.string());
-  return PriorOf(modes, face, source.count);
+  return MakePrior(modes, face, source.count);
 }
 
-std::vector<std::filesystem::path> FilesOfSource(const NoPrior&) { return {}; }
-std::vector<std::filesystem::path> FilesOfSource(const IctPrior&) { return {}; }
-std::vector<std::filesystem::path> FilesOfSource(const ModesPrior& source) {
+std::vector<std::filesystem::path> ListFiles(const NoPrior&) { return {}; }
+std::vector<std::filesystem::path> ListFiles(const IctPrior&) { return {}; }
+std::vector<std::filesystem::path> ListFiles(const ModesPrior& source) {
   return ModesPriorFiles(source);
 }
-std::vector<std::filesystem::path> FilesOfSource(const HSplinePrior& source) {
-  return {source.modes};
-}
+std::vector<std::filesystem::path> ListFiles(const HSplinePrior& source) { return {source.modes}; }
 
 }  // namespace
 
@@ -173,7 +335,7 @@ HSplineModes ModesOnTemplate(const FacePrior& prior, const PriorOnTemplate& on_t
   }
   double squares = 0, most = 0, values = 0;
   for (Eigen::Index k = 0; k < std::min<Eigen::Index>(count, prior.model.Modes()); ++k) {
-    const std::vector<Vec3> moves = DisplacementsOf(prior, on_template, k);
+    const std::vector<Vec3> moves = SampleMode(prior, on_template, k);
     result.modes.push_back(NetThrough(result.shape, level, on_template.grid, moves));
     for (std::size_t s = 0; s < moves.size(); s += 7) {
       const Stencil stencil = StencilAt(result.shape, level, on_template.grid.UvAt(s));
@@ -222,7 +384,7 @@ HSplineModes HSplineModesFromJson(std::string_view text, std::string_view name) 
   }
 }
 
-FacePrior PriorOf(const HSplineModes& modes, const TemplateFace& face, int count) {
+FacePrior MakePrior(const HSplineModes& modes, const TemplateFace& face, int count) {
   const HSplineShape& shape = face.surface.shape();
   if (shape.patches_u != modes.shape.patches_u || shape.patches_v != modes.shape.patches_v ||
       shape.closure != modes.shape.closure) {
@@ -231,7 +393,7 @@ FacePrior PriorOf(const HSplineModes& modes, const TemplateFace& face, int count
         "template that they were made for",
         modes.shape.patches_u, modes.shape.patches_v, shape.patches_u, shape.patches_v));
   }
-  Tessellation mesh = MeshOf(face);
+  Tessellation mesh = MakeMesh(face);
   FacePrior prior;
   const Eigen::Index used = std::min<Eigen::Index>(count, std::ssize(modes.modes));
   prior.model.modes.resize(3 * std::ssize(mesh.uv), used);
@@ -259,7 +421,7 @@ FacePrior LoadPrior(const PriorSource& source, const TemplateFace& face) {
 }
 
 std::vector<std::filesystem::path> PriorFiles(const PriorSource& source) {
-  return std::visit([](const auto& given) { return FilesOfSource(given); }, source);
+  return std::visit([](const auto& given) { return ListFiles(given); }, source);
 }
 
 }  // namespace semblance

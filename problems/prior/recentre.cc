@@ -8,7 +8,7 @@
 #include <string>
 
 #include "interp/dowels/dowel.h"
-#include "problems/prior/prior_target.h"
+#include "problems/prior/prior_observations.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/quantile.h"
@@ -24,7 +24,8 @@ Vec3 Mirrored(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
 // Sites
 // ---------------------------------------------------------------------------------------------
 
-// Close to the skin, with hardly a word from the dowels.
+// Follows the skin closely and the dowels hardly: the dowels' places on the mean are what is
+// sought.
 ShapeFitOptions CloseFit() {
   ShapeFitOptions options;
   options.tip_normal_sd_mm = 5;
@@ -37,11 +38,11 @@ ShapeFitOptions CloseFit() {
   return options;
 }
 
-// Where on the mean the tips of a head lie, by site.
-std::map<std::string, Vec3> PlacesOn(const FacePrior& prior, const KnownHead& head, double tip_mm,
-                                     const RunContext& context) {
+// The places of a head's tips on the mean, by site.
+std::map<std::string, Vec3> FindPlaces(const FacePrior& prior, const KnownHead& head, double tip_mm,
+                                       const RunContext& context) {
   ShapeTarget target = PriorTarget(prior, head.dowels, nullptr, &head.skin);
-  target.features.clear();  // they are skin as well
+  target.features.clear();  // at the features, too, the skin is known
   const ShapeEstimate close = EstimateShape(prior.model, target, CloseFit(), context);
   const MeshQuery face(TriMesh{close.points, prior.model.mean.triangles}), skin(head.skin);
   std::map<std::string, Vec3> places;
@@ -55,7 +56,7 @@ std::map<std::string, Vec3> PlacesOn(const FacePrior& prior, const KnownHead& he
   return places;
 }
 
-// A weighted sum of places, all brought to one side.
+// A weighted sum of places, all mirrored to one side.
 struct Places {
   Vec3 sum = Vec3::Zero();
   double weight = 0;
@@ -66,13 +67,13 @@ struct Places {
   }
 };
 
-// What all heads and the present place say of each site.
-std::map<std::string, Vec3> SitesOnMean(const FacePrior& prior,
-                                        std::span<const std::map<std::string, Vec3>> heads,
-                                        double site_prior) {
+// The mean place of each site over all heads and its present place.
+std::map<std::string, Vec3> MeanSites(const FacePrior& prior,
+                                      std::span<const std::map<std::string, Vec3>> heads,
+                                      double site_prior) {
   std::map<std::string, Places> of_landmark;
   for (const Site& site : StandardSites()) {
-    const double sides = site.side == Side::kMidline ? 2 : 1;  // a pair is seen twice
+    const double sides = site.side == Side::kMidline ? 2 : 1;  // a pair counts once per side
     for (const auto& head : heads) {
       if (const auto at = head.find(site.code); at != head.end()) {
         of_landmark[site.landmark].Add(site, at->second, sides);
@@ -118,8 +119,8 @@ double MedianMove(const FacePrior& before, const FacePrior& after) {
 // Mean
 // ---------------------------------------------------------------------------------------------
 
-// How far the skin lies outside the prior's face of a head at each point of the model, in the
-// model's mm; NaN where no skin is before the point.
+// The distance by which a head's skin lies outside its face by the prior, at each point of the
+// model and in the model's mm. NaN if no skin lies in front of the point.
 std::vector<double> Misfit(const FacePrior& prior, const KnownHead& head,
                            const RecentreOptions& options, const RunContext& context) {
   ShapeFitOptions dowels_alone;
@@ -139,7 +140,7 @@ std::vector<double> Misfit(const FacePrior& prior, const KnownHead& head,
   return misfit_mm;
 }
 
-// The point of the model that is nearest to the mirror image of each.
+// For each point of the model, the one nearest to its mirror image.
 std::vector<int> Partners(const TriMesh& mean, const RunContext& context) {
   const MeshQuery query(mean);
   std::vector<int> partner(mean.points.size(), -1);
@@ -156,7 +157,8 @@ struct Sums {
   std::vector<double> sum, count;
 };
 
-Sums OfBothSides(const std::vector<std::vector<double>>& misfits, const std::vector<int>& partner) {
+Sums SumBothSides(const std::vector<std::vector<double>>& misfits,
+                  const std::vector<int>& partner) {
   Sums sums{std::vector<double>(partner.size(), 0), std::vector<double>(partner.size(), 0)};
   for (const std::vector<double>& misfit_mm : misfits) {
     for (std::size_t v = 0; v < partner.size(); ++v) {
@@ -169,7 +171,8 @@ Sums OfBothSides(const std::vector<std::vector<double>>& misfits, const std::vec
   return sums;
 }
 
-// The shift of each point along its normal: means over its neighbourhood, drawn to 0.
+// The shift of each point along its normal: the Gaussian mean over its neighbourhood, shrunk
+// towards 0 by options.mean_prior. Weights beyond 3 standard deviations are left out.
 std::vector<double> Shifts(const TriMesh& mean, const Sums& sums, const RecentreOptions& options,
                            const RunContext& context) {
   const std::vector<double> areas = VertexAreas(mean);
@@ -232,9 +235,9 @@ Recentred Recentre(const FacePrior& prior, const PriorOnTemplate& on_template,
                    const RecentreOptions& options, const RunContext& context) {
   std::vector<std::map<std::string, Vec3>> places;
   for (const KnownHead& head : heads) {
-    places.push_back(PlacesOn(prior, head, options.tip_mm, context));
+    places.push_back(FindPlaces(prior, head, options.tip_mm, context));
   }
-  const std::map<std::string, Vec3> sites = SitesOnMean(prior, places, options.site_prior);
+  const std::map<std::string, Vec3> sites = MeanSites(prior, places, options.site_prior);
   const FacePrior moved = WithSites(prior, sites);
   Recentred result{.face = face};
   result.face.site_uv = SiteUv(face, on_template, sites);
@@ -248,7 +251,7 @@ Recentred Recentre(const FacePrior& prior, const PriorOnTemplate& on_template,
     misfits.push_back(Misfit(moved, head, options, context));
   }
   const TriMesh& mean = prior.model.mean;
-  const Sums sums = OfBothSides(misfits, Partners(mean, context));
+  const Sums sums = SumBothSides(misfits, Partners(mean, context));
   const std::vector<double> shift_mm = Shifts(mean, sums, options, context);
   result.face.surface = Shifted(face, prior, on_template, shift_mm);
   double squares = 0, seen = 0, most = 0;

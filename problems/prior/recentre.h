@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A generic face set right by heads whose skin is known: where the sites of the skull meet it, and
-// where its mean is off.
+// Corrects a generic face by heads whose skin is known: the places of the skull's sites on it, and
+// the bias of its mean.
 #pragma once
 
 #include <span>
@@ -9,7 +9,7 @@
 #include "interp/dowels/dowel.h"
 #include "problems/face_template/template_face.h"
 #include "problems/prior/face_prior.h"
-#include "problems/prior/prior_surface.h"
+#include "problems/prior/hspline_prior.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance {
@@ -21,28 +21,29 @@ struct KnownHead {
 };
 
 struct RecentreOptions {
-  bool move_mean = false;  // else the sites alone
-  double tip_mm = 3;       // a dowel with its tip farther from the skin says nothing of its site
-  double site_prior = 2;   // how many points the present place of a site counts as
-  double mean_prior = 2;   // how many points the present mean counts as
-  double smooth_mm = 6;    // of the shift of the mean: standard deviation of the weights
-  double gap_mm = 2.5;     // a skin farther beside a point's normal says nothing of it
-  double farthest_mm = 6;  // nor one farther along it
+  bool move_mean = false;  // false: corrects the sites alone
+  double tip_mm = 3;       // a dowel counts only if its tip lies within this of the skin
+  double site_prior = 2;   // the present place of a site counts as so many observations
+  double mean_prior = 2;   // the present mean counts as so many observations
+  double smooth_mm = 6;    // standard deviation of the weights that smooth the shift of the mean
+  double gap_mm = 2.5;     // skin counts only within this beside a point's normal ...
+  double farthest_mm = 6;  // ... and within this along it
 };
 
 struct Recentred {
   TemplateFace face;
   double sites_moved_mm = kNaN;  // median over the sites
-  double mean_moved_mm = kNaN;   // RMS over the points that a skin was seen before
+  double mean_moved_mm = kNaN;   // RMS over the points with skin in front of them
   double mean_moved_most_mm = kNaN;
 };
 
-// Sites: the prior is fitted to each head's skin, closely, and a dowel's tip gives the place of its
-// site on the mean; a site's place is the mean over heads, both sides and the present place. Those
-// without a landmark stay. Mean: with these sites the prior's face is estimated from each head's
-// dowels alone; a point of the mean then moves along its normal by what the skins are off there in
-// the mean, of both sides, smoothed and drawn to 0. Left and right stay mirror images as far as
-// they were. Throws InputError as EstimateShape.
+// Sites: the prior is fitted closely to each head's skin, and the tip of a dowel gives the place of
+// its site on the mean. The new place is the mean over heads, both sides and the present place. A
+// site without a dowel stays.
+// Mean: with these sites the prior's face is estimated from each head's dowels alone. Each point of
+// the mean then moves along its normal by the mean distance of the skins from those faces, taken
+// over both sides, smoothed and shrunk towards 0. Left and right stay mirror images as far as they
+// were. Throws InputError as EstimateShape does.
 Recentred Recentre(const FacePrior& prior, const PriorOnTemplate& on_template,
                    const TemplateFace& face, std::span<const KnownHead> heads,
                    const RecentreOptions& options, const RunContext& context);

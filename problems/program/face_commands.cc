@@ -14,7 +14,7 @@
 #include "problems/config/config.h"
 #include "problems/edits/edit_script.h"
 #include "problems/exports/export_file.h"
-#include "problems/face_template/template_io.h"
+#include "problems/face_template/template_source.h"
 #include "problems/output/given_files.h"
 #include "problems/prior/hspline_prior.h"
 #include "surfaces/base/atomic_file.h"

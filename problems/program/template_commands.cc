@@ -17,7 +17,7 @@
 
 #include "problems/bust/whole_head.h"
 #include "problems/command_line/exit_code.h"
-#include "problems/face_template/template_io.h"
+#include "problems/face_template/template_source.h"
 #include "problems/face_template/template_summary.h"
 #include "problems/inputs/input_files.h"
 #include "problems/output/staged_folder.h"

@@ -59,7 +59,7 @@ struct Search {
   bool Counts(std::size_t v) const {
     constexpr double kAlike = 0.3;
     const Vec3 d = skull.mesh.points[v] - predicted;
-    return d.norm() <= 1.5 * reach_mm && skull.normals[v].dot(normal) > kAlike &&
+    return d.norm() <= 1.5 * reach_mm && skull.surface.vertex_normals()[v].dot(normal) > kAlike &&
            (!midline || std::abs(left.dot(d)) <= kHalfMidline_mm);
   }
 };
@@ -122,16 +122,17 @@ const SiteRule& RuleOf(std::string_view site) {
 SnappedSite SnapToBone(std::string_view site, const Vec3& predicted, const SkullShell& skull,
                        const Mat3& skull_from_average) {
   const SiteRule& rule = RuleOf(site);
-  const MeshPoint closest = skull.query.Closest(predicted);
+  const MeshPoint closest = skull.surface.query().Closest(predicted);
   SnappedSite snapped{.point = closest.position,
                       .from_bone_mm = closest.distance_mm,
                       .moved_mm = closest.distance_mm,
                       .sharpness_mm = 0};
   if (rule.reach_mm > 0) {
-    const Search search = SearchFor(rule, site, skull.At(closest), skull, skull_from_average);
+    const ShellPoint on_shell{closest.position, skull.surface.NormalAt(closest)};
+    const Search search = SearchFor(rule, site, on_shell, skull, skull_from_average);
     if (const auto best = Furthest(search)) {
       const Vec3 inside = skull.mesh.points[*best] - rule.inset_mm * search.along;
-      snapped.point = skull.query.Closest(inside).position;
+      snapped.point = skull.surface.query().Closest(inside).position;
       snapped.sharpness_mm = Sharpness_mm(search, *best);
       snapped.moved_mm = (snapped.point - predicted).norm();
     }

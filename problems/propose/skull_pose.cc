@@ -46,13 +46,13 @@ struct ShellPair {
         of_skull(SpreadPoints(to, cell_mm)) {}
 };
 
+constexpr CorrespondenceOptions kSameWay = {.least_cosine = 0.34};  // within 70 degrees
+
 ShellMatch MatchOf(const ShellPoint& from, const ShellPoint& to) {
-  constexpr double kAlike = 0.34;  // cosine of 70 degrees
   return {.from = from.position,
           .to = to.position,
           .normal = to.normal,
-          .distance_mm = (to.position - from.position).norm(),
-          .faces_alike = from.normal.dot(to.normal) > kAlike};
+          .distance_mm = (to.position - from.position).norm()};
 }
 
 ShellPoint Moved(const ShellPoint& p, const Similarity& pose) {
@@ -64,10 +64,14 @@ std::vector<ShellMatch> MatchBothWays(const ShellPair& pair, const Similarity& p
   std::vector<ShellMatch> matches;
   for (const ShellPoint& p : pair.of_reference) {
     const ShellPoint moved = Moved(p, pose);
-    matches.push_back(MatchOf(moved, pair.skull.Closest(moved.position)));
+    const auto to = pair.skull.surface.Find(moved.position, moved.normal, kSameWay);
+    matches.push_back(to ? MatchOf(moved, {to->point.position, to->normal}) : ShellMatch());
   }
   for (const ShellPoint& q : pair.of_skull) {
-    matches.push_back(MatchOf(Moved(pair.reference.Closest(back * q.position), pose), q));
+    const auto from =
+        pair.reference.surface.Find(back * q.position, back.rotation * q.normal, kSameWay);
+    matches.push_back(from ? MatchOf(Moved({from->point.position, from->normal}, pose), q)
+                           : ShellMatch());
   }
   return matches;
 }
@@ -76,7 +80,7 @@ std::vector<ShellMatch> MatchBothWays(const ShellPair& pair, const Similarity& p
 double Misfit_mm(const std::vector<ShellMatch>& matches) {
   std::vector<double> distances_mm;
   for (const ShellMatch& m : matches) {
-    distances_mm.push_back(m.faces_alike ? std::min(m.distance_mm, kFarthest_mm) : kFarthest_mm);
+    distances_mm.push_back(std::fmin(m.distance_mm, kFarthest_mm));  // the latter without a match
   }
   std::ranges::sort(distances_mm);
   distances_mm.resize(static_cast<std::size_t>(kKept * static_cast<double>(matches.size())));
@@ -208,7 +212,8 @@ Similarity Inverse(const Similarity& b_from_a) {
 
 std::vector<ShellMatch> KeepClosest(const std::vector<ShellMatch>& matches, double share) {
   std::vector<ShellMatch> kept;
-  std::ranges::copy_if(matches, std::back_inserter(kept), &ShellMatch::faces_alike);
+  std::ranges::copy_if(matches, std::back_inserter(kept),
+                       [](const ShellMatch& m) { return std::isfinite(m.distance_mm); });
   std::ranges::stable_sort(kept, {}, &ShellMatch::distance_mm);
   kept.resize(static_cast<std::size_t>(share * static_cast<double>(kept.size())));
   return kept;

@@ -10,20 +10,20 @@
 
 namespace semblance {
 
-// Of a point of the reference, moved, with a point of the skull.
+// A point of the moved reference and the point of the skull that corresponds to it. All NaN if none
+// does.
 struct ShellMatch {
   Vec3 from = Vec3::Constant(kNaN);    // of the moved reference
   Vec3 to = Vec3::Constant(kNaN);      // of the skull
   Vec3 normal = Vec3::Constant(kNaN);  // of the skull there
   double distance_mm = kNaN;
-  bool faces_alike = false;  // normals within 70 degrees
 };
 
 // One damped Gauss-Newton step towards least squared distances along the normals: the motion, of
 // the moved reference, that makes them least. With scale_too false the scale stays 1.
 Similarity StepTowards(const std::vector<ShellMatch>& matches, bool scale_too);
 
-// The `share` of the matches with the least distances, of those that face alike.
+// The `share` with the least distances of the points that have a match.
 std::vector<ShellMatch> KeepClosest(const std::vector<ShellMatch>& matches, double share);
 
 Similarity operator*(const Similarity& c_from_b, const Similarity& b_from_a);

@@ -64,37 +64,28 @@ TriMesh WithoutSpecks(const TriMesh& mesh, const std::string& name) {
 
 // What is seen from outside, decided on a coarser mesh, where it costs a quarter.
 TriMesh OuterPart(const TriMesh& mesh, int threads) {
-  constexpr double kCell_mm = 4, kNear_mm = 4, kAlike = 0.3;
+  constexpr double kCell_mm = 4;
+  constexpr CorrespondenceOptions kSameBone = {.reach_mm = 4, .least_cosine = 0.3};
   const TriMesh coarse = ClusterVertices(mesh, kCell_mm);
   const std::vector<bool> seen = SeenFromOutside(coarse, threads);
   if (std::ranges::find(seen, true) == seen.end()) {
     return {};
   }
-  const SkullShell outer = AsShell(Submesh(coarse, seen));
+  const Correspondences outer(Submesh(coarse, seen));
   std::vector<std::uint8_t> keep(mesh.triangles.size());  // bytes: threads may write neighbours
   ParallelFor(keep.size(), threads, 256, [&](std::size_t t) {
-    const MeshPoint near = outer.query.Closest(TriangleCentroid(mesh, mesh.triangles[t]));
     const Vec3 normal = TriangleAreaVector(mesh, mesh.triangles[t]).normalized();
-    keep[t] = near.distance_mm <= kNear_mm && outer.At(near).normal.dot(normal) > kAlike ? 1 : 0;
+    const Vec3 centroid = TriangleCentroid(mesh, mesh.triangles[t]);
+    keep[t] = outer.Find(centroid, normal, kSameBone) ? 1 : 0;
   });
   return Submesh(mesh, {keep.begin(), keep.end()});
 }
 
 }  // namespace
 
-ShellPoint SkullShell::At(const MeshPoint& p) const {
-  const Triangle& t = mesh.triangles[p.triangle];
-  const Vec3 normal =
-      p.weights[0] * normals[t[0]] + p.weights[1] * normals[t[1]] + p.weights[2] * normals[t[2]];
-  return {p.position, normal.normalized()};
-}
-
-ShellPoint SkullShell::Closest(const Vec3& p) const { return At(query.Closest(p)); }
-
 SkullShell AsShell(TriMesh mesh) {
-  std::vector<Vec3> normals = VertexNormals(mesh);
-  MeshQuery query(mesh);
-  return {.mesh = std::move(mesh), .normals = std::move(normals), .query = std::move(query)};
+  Correspondences surface(mesh);
+  return {.mesh = std::move(mesh), .surface = std::move(surface)};
 }
 
 SkullShell MakeShell(const TriMesh& skull, const std::string& name, int threads) {
@@ -115,10 +106,11 @@ std::vector<ShellPoint> SpreadPoints(const SkullShell& shell, double cell_mm) {
     const Vec3 p = TriangleCentroid(shell.mesh, shell.mesh.triangles[t]);
     const auto cell = [&](int i) { return std::lround(p[i] / cell_mm); };
     if (taken.insert({cell(0), cell(1), cell(2)}).second) {
-      points.push_back(shell.At({.position = p,
-                                 .triangle = static_cast<int>(t),
-                                 .distance_mm = 0,
-                                 .weights = Vec3::Constant(1.0 / 3)}));
+      const MeshPoint centroid{.position = p,
+                               .triangle = static_cast<int>(t),
+                               .distance_mm = 0,
+                               .weights = Vec3::Constant(1.0 / 3)};
+      points.push_back({p, shell.surface.NormalAt(centroid)});
     }
   }
   return points;

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/correspondences.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
@@ -16,12 +16,8 @@ struct ShellPoint {
 };
 
 struct SkullShell {
-  TriMesh mesh;               // need not be manifold
-  std::vector<Vec3> normals;  // one per vertex, unit
-  MeshQuery query;            // of the mesh
-
-  ShellPoint Closest(const Vec3& p) const;
-  ShellPoint At(const MeshPoint& p) const;
+  TriMesh mesh;             // need not be manifold
+  Correspondences surface;  // the closest points of the mesh and their normals
 };
 
 // Vertices 2 mm apart, of the triangles that are seen from outside (outer_surface.h) in bodies of 3

@@ -11,7 +11,7 @@
 namespace semblance {
 namespace {
 
-constexpr double kAlike = 0.5;  // cosine of 60 degrees between normals
+constexpr double kLeastCosine = 0.5;  // normals within 60 degrees
 
 // Points of the reference and where they belong on the skull.
 struct Pairs {
@@ -89,19 +89,18 @@ class Warper {
 
  private:
   Pairs Match(double reach_mm) const {
+    const CorrespondenceOptions match{.reach_mm = reach_mm, .least_cosine = kLeastCosine};
     Pairs pairs;
     for (const ShellPoint& p : of_reference_) {
       const Vec3 moved = plate_(p.position);
-      const ShellPoint q = skull_.Closest(moved);
-      if ((pose_.rotation * p.normal).dot(q.normal) > kAlike) {
-        pairs.Add(p.position, q.position, (q.position - moved).norm(), reach_mm);
+      if (const auto q = skull_.surface.Find(moved, pose_.rotation * p.normal, match)) {
+        pairs.Add(p.position, q->point.position, q->point.distance_mm, reach_mm);
       }
     }
-    const SkullShell carried = AsShell(Carried(coarse_, plate_));
+    const Correspondences carried(Carried(coarse_, plate_));
     for (const ShellPoint& q : of_skull_) {
-      const MeshPoint p = carried.query.Closest(q.position);
-      if (carried.At(p).normal.dot(q.normal) > kAlike) {
-        pairs.Add(Before(p), q.position, p.distance_mm, reach_mm);
+      if (const auto p = carried.Find(q.position, q.normal, match)) {
+        pairs.Add(Before(p->point), q.position, p->point.distance_mm, reach_mm);
       }
     }
     return pairs;
@@ -124,18 +123,15 @@ class Warper {
 
 std::vector<ShellMatch> MatchPiece(const std::vector<ShellPoint>& piece, const SkullShell& skull,
                                    const Similarity& motion) {
-  constexpr double kReach_mm = 6;
+  constexpr CorrespondenceOptions kMatch = {.reach_mm = 6, .least_cosine = kLeastCosine};
   std::vector<ShellMatch> matches;
   for (const ShellPoint& p : piece) {
     const Vec3 from = motion * p.position;
-    const ShellPoint q = skull.Closest(from);
-    const double distance_mm = (q.position - from).norm();
-    if (distance_mm <= kReach_mm) {
+    if (const auto q = skull.surface.Find(from, motion.rotation * p.normal, kMatch)) {
       matches.push_back({.from = from,
-                         .to = q.position,
-                         .normal = q.normal,
-                         .distance_mm = distance_mm,
-                         .faces_alike = (motion.rotation * p.normal).dot(q.normal) > kAlike});
+                         .to = q->point.position,
+                         .normal = q->normal,
+                         .distance_mm = q->point.distance_mm});
     }
   }
   return matches;

@@ -10,7 +10,6 @@
 
 #include "fitting/problem/seeding.h"
 #include "fitting/relaxation/dowel_mesh.h"
-#include "problems/metrics/face_metrics_json.h"
 #include "problems/subject/sites.h"
 
 namespace semblance {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/bust/bust_files.h"
+#include "problems/metrics/face_metrics.h"
 #include "problems/output/manifest.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/report/result_json.h"

@@ -12,7 +12,6 @@
 #include "problems/config/config.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/experiment_config.h"
-#include "problems/pipeline/stage_key.h"
 #include "problems/propose/propose_landmarks.h"
 #include "problems/report/run_folder.h"
 #include "problems/workbench/bench_actions.h"

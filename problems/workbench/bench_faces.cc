@@ -8,8 +8,8 @@
 
 #include "problems/edits/edit_script.h"
 #include "problems/pipeline/case.h"
+#include "problems/pipeline/experiment_config.h"
 #include "problems/pipeline/make_face.h"
-#include "problems/pipeline/stage_key.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

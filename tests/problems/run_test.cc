@@ -15,7 +15,7 @@
 #include <numbers>
 
 #include "fitting/terms/metric_distortion.h"
-#include "problems/face_template/template_io.h"
+#include "problems/face_template/template_source.h"
 #include "problems/inputs/input_files.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/output/given_files.h"
@@ -44,7 +44,7 @@ using testing::WordsOf;
 
 const fs::path kConfigs = fs::path(SEMBLANCE_SOURCE_DIR) / "configs";
 
-// A phantom coarse enough to be quick.
+// A phantom that is coarse enough to be quick.
 Experiment SmallPhantom(std::vector<std::string> overrides = {}) {
   overrides.insert(overrides.begin(), {"subject.rings=40", "implicit.resolution=48"});
   return ReadConfig<Experiment>(kConfigs / "phantom.yaml", overrides);
@@ -103,7 +103,8 @@ std::string TemplateOfIctFiles() {
       (kConfigs / "faces/ict/").string());
 }
 
-// A reference whose skull is the subject's under an affine map: the plate undoes just that.
+// The skull of the reference is the subject's under an affine map. The plate undoes exactly that
+// map.
 TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjects) {
   const std::string files = TemplateOfIctFiles();
   const RunResult placed = semblance::Run(SmallPhantom({files, "face=placed"}), {});
@@ -160,7 +161,7 @@ TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
   EXPECT_THAT(ResultJson(experiment, result).dump(), HasSubstr("coefficients_rms"));
 }
 
-// At a site that the prior lacks: the point of the face nearest to the tip.
+// At a site that the prior lacks, the (u,v) is that of the point of the face nearest to the tip.
 TEST(Run, APriorsFaceIsMeasuredWhereItMeetsTheDowels) {
   const std::string mine = "sites={mine: {near: [im_l, lo_l], depth: 12}}";
   const RunResult result = semblance::Run(PhantomWithPrior({mine}), {});
@@ -170,7 +171,7 @@ TEST(Run, APriorsFaceIsMeasuredWhereItMeetsTheDowels) {
   EXPECT_NEAR(result.fit.residual_mm[at - result.target.points.begin()], nearest_mm, 0.1);
   EXPECT_THAT(WordsOf<InputError>(
                   [] { semblance::Run(PhantomWithPrior({"sites={g: {uv: [0.3, 0.3]}}"}), {}); }),
-              HasSubstr("sites.g.uv: `face: prior` has a place of its own for the landmark g"));
+              HasSubstr("sites.g.uv: `face: prior` has its own place for the landmark g"));
 }
 
 TEST(Run, EditsChangeTheFacesDrawnBesideAsTheDrawItself) {
@@ -204,7 +205,7 @@ TEST(Run, ASampleIsTheFaceOfTheDrawOfItsNumber) {
 
 TEST(Run, AFaceOfAPriorNeedsOne) {
   EXPECT_THAT([] { SmallPhantom({"face=prior"}); },
-              ::testing::ThrowsMessage<ConfigError>(HasSubstr("which is one of `template: ict`")));
+              ::testing::ThrowsMessage<ConfigError>(HasSubstr("which fits `template: ict` alone")));
   EXPECT_THAT(
       [] {
         SmallPhantom({"face=prior", "prior=none"});
@@ -236,7 +237,8 @@ TEST(Run, TheFaceIsASheetWithoutFoldsThatFacesOut) {
   EXPECT_EQ(edges.inconsistent, 0);
   EXPECT_EQ(ConnectedComponents(face).count, 1);
   EXPECT_LT(SharpestEdge_deg(face), 60);
-  // Away from the middle of the head: no triangle on the dowels' side is turned over.
+  // Normals point away from the middle of the head, so no triangle on the dowels' side is turned
+  // over.
   const Vec3 middle = Bounds(result.subject.skull).center();
   int turned = 0;
   for (const Triangle& t : face.triangles) {
@@ -254,7 +256,7 @@ RunResult RunWithTerm(const std::string& term, StageCache& cache) {
       {}, &cache);
 }
 
-// Mean distance from the shell of the skull, of the places on the face that stand for points.
+// Mean distance of the face from the shell of the skull, at the (u,v) of the points.
 double MeanHeight_mm(const RunResult& result) {
   const MeshQuery shell(result.shell);
   double sum = 0;
@@ -264,7 +266,7 @@ double MeanHeight_mm(const RunResult& result) {
   return sum / static_cast<double>(result.target.points.size());
 }
 
-// Root mean square of what springs to the points' anchors are longer or shorter than at rest.
+// Root mean square of the springs' elongation between the points and their anchors.
 double SpringRms_mm(const RunResult& result) {
   double sum = 0, weights = 0;
   for (std::size_t k = 0; k < result.target.points.size(); ++k) {
@@ -302,7 +304,7 @@ TEST(Run, ATermIsObeyedTheMoreItWeighs) {
   EXPECT_LT(much, 0.6 * little);
 }
 
-// How many of the offsets that make features are the template's after a run.
+// The number of feature offsets that equal the template's after a run.
 int KeptFeatures(const RunResult& result) {
   int kept = 0;
   for (const VertexId& vertex : FeatureVertices(result.placed)) {
@@ -311,7 +313,8 @@ int KeptFeatures(const RunResult& result) {
   return kept;
 }
 
-// Whether a rule spares the features is for studies to say; here that a run obeys and reports it.
+// Studies measure whether a rule protects the features. This test checks that a run obeys and
+// reports it.
 TEST(Run, SaysWhatItDidToTheFeatures) {
   StageCache cache(16);
   for (const std::string rule : {"frozen", "free"}) {
@@ -359,7 +362,7 @@ TEST(Run, ATemplateThatIsNotThereIsOneClearError) {
   EXPECT_THROW(semblance::Run(experiment, {}), IoError);
 }
 
-// A phantom in files whose left cheek is gone, and nothing else of it.
+// A phantom in files. Only its left cheek is missing.
 Experiment WithoutCheek(const fs::path& folder) {
   const Phantom phantom = MakePhantom({.random_seed = 2, .rings = 40});
   const Vec3 cheek =
@@ -457,7 +460,7 @@ void ExpectReportBuiltAnew(const fs::path& folder, const std::string& report) {
   EXPECT_EQ(ReadFileBytes(folder / "report.html"), report);
 }
 
-// One test, for each of its runs makes all pictures.
+// This is a single test, because each of its runs makes all pictures.
 TEST(Run, TheFolderHoldsWhatItsManifestListsInTheSameBytesForAnyNumberOfThreads) {
   const ScratchFolder folder;
   const auto one = FilesOfRun(SmallPhantom(), folder / "one", 1);

@@ -20,9 +20,9 @@
 #include "fitting/problem/placement.h"
 #include "problems/bust/bust_files.h"
 #include "problems/bust/head_domain.h"
-#include "problems/bust/ict_head.h"
 #include "problems/bust/soft_deformation.h"
 #include "problems/bust/whole_head.h"
+#include "problems/face_template/ict_face.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -39,7 +39,7 @@ using ::testing::HasSubstr;
 using ::testing::Pointwise;
 using ::testing::ThrowsMessage;
 
-// The head that the program carries, with few triangles.
+// The program's own head, with few triangles.
 BustModel SmallBust() {
   const WholeHead head = WholeHeadFromJson(IctHead(), "the ICT head");
   BustModel model{.name = "small",
@@ -119,7 +119,7 @@ TEST(PoseBust, MeetsTheFaceWithoutATornSeam) {
   const Bust bust = Pose(model, AnotherFace(model.rest->surface));
   EXPECT_EQ(bust.turned_over, 0);
   EXPECT_LT(bust.face_rms_mm, 0.3);
-  // By how much neighbours move apart, for each mm between them.
+  // The strain between neighbours, mm per mm.
   double strain = 0;
   for (const Triangle& t : model.mesh.triangles) {
     for (int k = 0; k < 3; ++k) {
@@ -179,7 +179,7 @@ TEST(PoseBust, AMeshWithLandmarksFollowsTheFaceToo) {
   }
 }
 
-TEST(PoseBust, SaysWhereSitesAreMissing) {
+TEST(PoseBust, RefusesAModelWithTooFewSites) {
   BustModel model = SmallBust();
   model.rest.reset();
   model.sites = {{"g", {0, 0, 0}}};
@@ -263,7 +263,7 @@ class ObjBust : public ::testing::Test {
     }
     return files;
   }
-  // Of the GLB.
+  // Reads the GLB.
   static nlohmann::json JsonOf(const std::string& glb) {
     return nlohmann::json::parse(glb.substr(20, Word(glb, 12)));
   }
@@ -308,7 +308,7 @@ TEST_F(ObjBust, KeepsItsLinesMaterialsAndTextures) {
   EXPECT_THAT([&] { Read(); }, ThrowsMessage<InputError>(HasSubstr("not below its own folder")));
 }
 
-// Nor does one replace another one.
+// Textures get different names, so that none replaces a result of the run or another texture.
 TEST_F(ObjBust, NoTextureReplacesAResultOfTheRun) {
   Write("head.mtl",
         "newmtl face\nmap_Kd face.ply\nnewmtl a\nmap_Kd skin/diffuse.png\nmap_Ks ./face.ply\n"
@@ -524,7 +524,7 @@ TEST(WholeHead, ItsMeshIsOnePieceOpenAtTheNeckAlone) {
   EXPECT_EQ(ConnectedComponents(mesh).count, 1);
 }
 
-// Where all u meet.
+// At the crown all u meet.
 TEST(WholeHead, ItsMeshFoldsNowhereAtTheCrown) {
   const WholeHead head = WholeHeadFromJson(IctHead(), "the ICT head");
   for (const auto& [columns, rows] : {std::pair(272, 204), {96, 72}, {300, 150}}) {
@@ -548,7 +548,7 @@ TEST(WholeHead, ItsMeshFoldsNowhereAtTheCrown) {
     EXPECT_GT(seen, 50);
     EXPECT_EQ(folds, 0) << columns << " x " << rows;
   }
-  // And the fan is the surface.
+  // The fan follows the surface.
   const TriMesh mesh = WholeHeadMesh(head, 272, 204);
   const MeshQuery query(mesh);
   for (int i = 0; i < 40; ++i) {

@@ -52,7 +52,7 @@ TEST(EditScript, TheInverseTakesTheEditsBackToTheBit) {
     EXPECT_EQ(surface.Offsets(), before.Offsets());
     EXPECT_EQ(surface.Net(3).vertices, before.Net(3).vertices);
     ApplyEdits(again, surface);
-    ApplyEdits(FromText(WriteConfig(inverse)), surface);  // also by way of a file
+    ApplyEdits(FromText(WriteConfig(inverse)), surface);  // also through the text of a file
     EXPECT_EQ(surface.Net(3).vertices, before.Net(3).vertices);
   }
 }
@@ -111,7 +111,7 @@ TEST(EditScript, FaultsAreNamedAndNothingChanges) {
   EXPECT_EQ(surface.Net(3).vertices, before.Net(3).vertices);
 }
 
-TEST(EditScript, AVertexThatStandsTwiceIsSaidWhenTheFileIsRead) {
+TEST(EditScript, ARepeatedVertexIsRefusedWhenTheFileIsRead) {
   const ScratchFolder folder;
   const std::string edit = "  - {level: 1, i: 5, j: 6, offset: [9, 9, 9]}\n";
   WriteFileAtomically(folder / "twice.yaml", "edits:\n" + edit + edit);

@@ -81,14 +81,14 @@ TEST(Pull, MirroredBothSidesMoveAlike) {
     const Vec3 moved = after.LevelDerivative(2, pull.uv) - before.LevelDerivative(2, pull.uv);
     EXPECT_NEAR(moved.y(), -3, 1e-9) << u;
     EXPECT_NEAR(moved.z(), 1, 1e-9) << u;
-    if (u != 0.52) {  // there the sides hold each other, more or less
+    if (u != 0.52) {  // near the midline the sides hold each other
       EXPECT_NEAR(moved.x(), u > 0.5 ? 2 : 0, 1e-6) << u;
     }
   }
 }
 
 TEST(Pull, LeftIsTheSubjectsLeft) {
-  EXPECT_LT((LeftOf(MakeTemplateFace({}).surface) - Vec3(1, 0, 0)).norm(), 1e-6);
+  EXPECT_LT((FindLeft(MakeTemplateFace({}).surface) - Vec3(1, 0, 0)).norm(), 1e-6);
 }
 
 TEST(Pull, WhatCannotBeIsRefused) {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "problems/face_template/head_formula.h"
-#include "problems/face_template/template_sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_folder.h"
@@ -60,7 +59,7 @@ TEST_F(SkinLandmarkFiles, ATablesEndingMayBeInCapitals) {
   EXPECT_EQ(read.points[0].code, "prn");
 }
 
-TEST_F(SkinLandmarkFiles, OfThe68PointsThoseWithAPlaceOnTheGenericHeadAreTaken) {
+TEST_F(SkinLandmarkFiles, PointsOfMultiPieWithAPlaceOnTheGenericHeadAreUsed) {
   const SkinLandmarks read =
       Read({File("68.csv", "i_multipie,x,y,z\n1,9,9,9\n31,1,2,3\n49,4,5,6\n")});
   ASSERT_EQ(read.points.size(), 2);
@@ -98,7 +97,7 @@ TEST_F(SkinLandmarkFiles, PointsPickedInAProgramAreRead) {
   EXPECT_EQ(read.points[0].point, Vec3(1, 2, 3));
 }
 
-TEST_F(SkinLandmarkFiles, WhatIsWrongIsSaidWithItsPlace) {
+TEST_F(SkinLandmarkFiles, FaultsAreReportedWithTheirPlace) {
   EXPECT_THAT(FaultOf({File("a.csv", "site,x,y,z\nnose,1,2,3\n")}),
               AllOf(HasSubstr("a.csv:2"), HasSubstr("'nose'"), HasSubstr("prn")));
   EXPECT_THAT(

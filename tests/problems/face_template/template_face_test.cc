@@ -28,8 +28,8 @@ Vec3 Mirrored(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
 
 Vec3 PointOf(const std::string& site) { return Face().surface.Point(Face().site_uv.at(site)); }
 
-// How far the surface is from HeadPoint at the same (u,v), over a grid of samples_u x samples_v
-// points (>= 2 each).
+// The distance of the surface from HeadPoint at the same (u,v), over a grid of samples_u x
+// samples_v points (>= 2 each).
 struct TemplateResidual {
   double rms_mm = kNaN;
   double max_mm = kNaN;
@@ -79,7 +79,8 @@ TEST(TemplateFace, IsMirrorSymmetric) {
   }
 }
 
-// Of each level alone, too: offsets live in the frames of the next coarser one.
+// This must hold for each level alone, because offsets are kept in the frames of the next coarser
+// one.
 TEST(TemplateFace, NormalsPointOutwardEverywhere) {
   const Vec3 inside(0, 95, -30);
   for (int level = 0; level <= 3; ++level) {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "problems/face_template/template_io.h"
-#include "problems/face_template/template_sites.h"
+#include "problems/face_template/head_formula.h"
+#include "problems/face_template/template_source.h"
 #include "problems/face_template/template_summary.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
@@ -124,7 +124,7 @@ TEST(TemplateFit, AnotherHeadIsMetWithItsSitesInTheirPlacesAndWithoutFolds) {
   ASSERT_EQ(fit.sites.size(), 32);
   for (const auto& [code, site] : fit.sites) {
     EXPECT_LT(site.error_mm, 0.5) << code;
-    // here the truth is known: the parametrisation is the formula's
+    // The truth is known here: the parametrisation is the formula's.
     EXPECT_LT(site.drift_mm, 3) << code;
   }
   for (std::size_t k = 1; k < fit.levels.size(); ++k) {
@@ -150,7 +150,7 @@ TEST(TemplateFit, AnInnerWallAndAHoleDoNotMatterBeyondTheirPlace) {
   EXPECT_LT(fit.face_to_skin.rms_mm, 0.2);
   EXPECT_LT(fit.face_to_skin.covered, 0.995);
   EXPECT_EQ(fit.folds, 0);
-  // bridged about where the cheek was
+  // The hole is bridged near the place of the cheek.
   const SurfaceProjection bridge = SurfaceProjector(fit.face.surface).Project(cheek_point);
   EXPECT_LT(bridge.distance_mm, 1.5);
 }
@@ -174,11 +174,11 @@ TEST(TemplateFit, TheNumberOfThreadsDoesNotMatterAndTheFilesGiveTheSameFace) {
   EXPECT_EQ(read.site_uv, one.face.site_uv);
   ASSERT_EQ(read.features.size(), 4);
   EXPECT_EQ(read.features[0].vertices, one.face.features[0].vertices);
-  // the nose's region holds the nose
+  // The nose's region contains the nose.
   EXPECT_TRUE(read.features[0].region->Contains(read.surface.Point(UvOnGenericHead("prn"))));
 }
 
-TEST(TemplateFit, WhatCannotBecomeATemplateIsSaidInOneLine) {
+TEST(TemplateFit, AHeadThatCannotBecomeATemplateIsRefusedInOneLine) {
   const SkinLandmarks good = LandmarksOf();
   EXPECT_EQ(FaultOf(Head(), good), "accepted");
 
@@ -228,7 +228,7 @@ TEST(TemplateFit, WhatCannotBecomeATemplateIsSaidInOneLine) {
   EXPECT_THAT(FaultOf(Head(), far), AllOf(HasSubstr("'g'"), HasSubstr("from the outer skin")));
 }
 
-TEST(TemplateFit, TheSummaryTellsEveryLevelAndSite) {
+TEST(TemplateFit, TheSummaryHasEveryLevelAndSite) {
   const OuterHead head{.skin = Head(), .points = LandmarksOf().points, .notes = {"a note"}};
   TemplateFit fit{.face = MakeTemplateFace({}), .levels = {{.level = 0}}, .sites = {}};
   for (const auto& [code, uv] : fit.face.site_uv) {
@@ -241,7 +241,7 @@ TEST(TemplateFit, TheSummaryTellsEveryLevelAndSite) {
   EXPECT_THAT(TemplateText(fit, {}), HasSubstr("not met"));
 }
 
-// The generic model head, where its data are: with 68 landmarks and a rough map of the sites.
+// The generic model head with 68 landmarks and a rough map of the sites, if its data are installed.
 TEST(TemplateFit, AModelHeadOfOtherTopologyIsMet) {
   const std::filesystem::path data = SEMBLANCE_SOURCE_DIR "/../shared/data";
   const std::filesystem::path mesh = data / "template/ict_head_lps_mm.ply";

@@ -102,7 +102,7 @@ TEST_F(InputCheckTest, WhatRulesAndSitesSayOfAPhantomIsLookedAt) {
               Contains(HasSubstr("sites.g.uv: `face: prior` has a place of its own")));
   EXPECT_THAT(Look(base + uv).faults, IsEmpty());
   EXPECT_THAT(Look(base + "face: placed\nrounds: 2\n").warnings,
-              Contains(HasSubstr("rounds: `face: placed` does not look at it")));
+              Contains(HasSubstr("rounds: `face: placed` does not use it")));
 }
 
 TEST_F(InputCheckTest, ARuleThatDoesNotApplyIsTold) {
@@ -113,7 +113,7 @@ TEST_F(InputCheckTest, ARuleThatDoesNotApplyIsTold) {
       Contains(HasSubstr("rules.mouth_width is on, and it lacks uc_l, uc_r under rules.points"));
   EXPECT_THAT(Look(base + asked + "template: ict\nface: prior\n").warnings, lacks);
   EXPECT_THAT(Look(base + asked + "face: fit\n").warnings,
-              Contains(HasSubstr("rules.mouth_width is on, and the face asks no prior")));
+              Contains(HasSubstr("rules.mouth_width is on, and the face uses no prior")));
   EXPECT_THAT(Look(base + "template: ict\nface: prior\n").warnings, IsEmpty());
 }
 

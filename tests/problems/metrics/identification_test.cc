@@ -53,7 +53,8 @@ TEST(Identification, TheCurveRisesToOne) {
   EXPECT_EQ(curve.back(), 1);
 }
 
-// One face for everyone: the distances are the same whoever is asked for, so the ranks are 1 ... n.
+// With one face for everyone the distances do not depend on the person sought, so the ranks are 1
+// ... n.
 TEST(Identification, OneFaceForAllRanksByChance) {
   const std::vector<double> distances = {4, 2, 9, 1, 7};
   double sum = 0;

@@ -7,7 +7,8 @@
 #include <chrono>
 #include <thread>
 
-#include "problems/pipeline/implicit_cache.h"
+#include "problems/output/manifest.h"
+#include "problems/pipeline/skull_stage.h"
 #include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"

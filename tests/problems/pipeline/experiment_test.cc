@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Options that are right each by itself but not together.
+// Options that are valid each by itself but not together.
 #include "problems/pipeline/experiment.h"
 
 #include <fmt/format.h>
@@ -9,9 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "problems/face_template/template_io.h"
+#include "problems/face_template/template_source.h"
 #include "problems/pipeline/experiment_config.h"
-#include "problems/pipeline/stage_key.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
@@ -34,10 +33,10 @@ TEST(Experiment, TheTermOfAPriorNeedsAFaceOfThePrior) {
   const std::string terms = "fit: {terms: [points, prior_shape]}\n";
   EXPECT_THAT(Faults(terms + "face: fit\n"), HasSubstr("1:14: fit.terms: the term 'prior_shape'"));
   EXPECT_NO_THROW(ReadConfigText<Experiment>(terms + "face: prior_then_fit\n", "a.yaml"));
-  EXPECT_NO_THROW(ReadConfigText<Experiment>(terms, "a.yaml"));  // which is what auto comes to
+  EXPECT_NO_THROW(ReadConfigText<Experiment>(terms, "a.yaml"));  // to which auto resolves
 }
 
-// A prior is taken where it is one of the template.
+// A prior is used if it is one of the template.
 TEST(Experiment, TheWayToTheFaceFollowsTemplateAndPrior) {
   const auto way = [](const std::string& text) {
     return std::visit([](const auto& face) { return face.kName; },
@@ -49,19 +48,19 @@ TEST(Experiment, TheWayToTheFaceFollowsTemplateAndPrior) {
   EXPECT_EQ(way("template: formula\nprior: {type: hspline, modes: m.json}\n"), "prior_then_fit");
   EXPECT_EQ(way("face: placed\n"), "placed");
   EXPECT_THAT(Faults("template: formula\nface: prior\n"),
-              HasSubstr("a.yaml:2:7: face: it asks the prior 'ict'"));
-  EXPECT_THAT(Faults("prior: none\nface: prior\n"), HasSubstr("face: it asks a prior"));
+              HasSubstr("a.yaml:2:7: face: it uses the prior 'ict'"));
+  EXPECT_THAT(Faults("prior: none\nface: prior\n"), HasSubstr("face: it uses a prior"));
   EXPECT_NO_THROW(ReadConfigText<Experiment>("uncertainty: {samples: 2}\n", "a.yaml"));
 }
 
-TEST(Experiment, WhatAFaceDoesNotLookAtOfItsUncertaintyIsToldAtItsLine) {
+TEST(Experiment, UncertaintyOptionsThatTheFaceDoesNotUseAreFaultsAtTheirLine) {
   EXPECT_THAT(Faults("uncertainty: {dowel_sd_mm: 3}\n"),
               HasSubstr("a.yaml:1:28: uncertainty.dowel_sd_mm: `face: prior_then_fit` does not"));
   EXPECT_THAT(Faults("uncertainty: {own: 0.5, shared: 0.2, implicit_sd_mm: 1}\n"),
               AllOf(HasSubstr("face.table_depths.own"), HasSubstr("face.table_depths.shared"),
                     HasSubstr("face.implicit_spread")));
   EXPECT_THAT(Faults("face: placed\nuncertainty: {samples: 2}\n"),
-              HasSubstr("a.yaml:2:24: uncertainty.samples: `face: placed` does not look at it"));
+              HasSubstr("a.yaml:2:24: uncertainty.samples: `face: placed` does not use it"));
   EXPECT_THAT(Faults("face: thin_plate\nuncertainty: {own: 0.5}\n"), HasSubstr("uncertainty.own"));
   EXPECT_NO_THROW(ReadConfigText<Experiment>(
       "face: fit\nuncertainty: {samples: 2, dowel_sd_mm: 3, own: 0.5, implicit_sd_mm: 1}\n",
@@ -69,7 +68,7 @@ TEST(Experiment, WhatAFaceDoesNotLookAtOfItsUncertaintyIsToldAtItsLine) {
 }
 
 // A study may compare ways that share their options, so these are no faults.
-TEST(Experiment, WhatAFaceDoesNotLookAtOfSeedsAndFitIsTold) {
+TEST(Experiment, UnusedOptionsOfSeedsAndFitAreNoted) {
   const auto unused = [](const std::string& text) {
     return UnusedOptions(ReadConfigText<Experiment>(text, "a.yaml"));
   };
@@ -80,17 +79,17 @@ TEST(Experiment, WhatAFaceDoesNotLookAtOfSeedsAndFitIsTold) {
   EXPECT_THAT(unused("face: fit\n" + set), ::testing::IsEmpty());
   EXPECT_THAT(
       unused("face: thin_plate\n" + set),
-      ::testing::UnorderedElementsAre(
-          HasSubstr("seeds.weight: `face: thin_plate` does not look at it"),
-          HasSubstr("seeds.level: "), HasSubstr("first_fit: "), HasSubstr("rounds: "),
-          HasSubstr("fit.solver: "), HasSubstr("fit.plan.schedule: "), HasSubstr("fit.terms: ")));
+      ::testing::UnorderedElementsAre(HasSubstr("seeds.weight: `face: thin_plate` does not use it"),
+                                      HasSubstr("seeds.level: "), HasSubstr("first_fit: "),
+                                      HasSubstr("rounds: "), HasSubstr("fit.solver: "),
+                                      HasSubstr("fit.plan.schedule: "), HasSubstr("fit.terms: ")));
   EXPECT_THAT(unused(set), ::testing::UnorderedElementsAre(
-                               HasSubstr("seeds.weight: `face: prior_then_fit` does not look at "
+                               HasSubstr("seeds.weight: `face: prior_then_fit` does not use "
                                          "it; face.seed_weight"),
                                HasSubstr("first_fit: ")));
 }
 
-TEST(Experiment, AWidthWithoutALossIsTold) {
+TEST(Experiment, AWidthWithoutALossIsNoted) {
   const auto unused = [](const std::string& face, const std::string& points) {
     return UnusedOptions(ReadConfigText<Experiment>(
         fmt::format("face: {}\nfit: {{terms: [smoothness, {{type: points{}}}]}}\n", face, points),
@@ -106,8 +105,8 @@ TEST(Experiment, AWidthWithoutALossIsTold) {
               ElementsAre(HasSubstr("fit.terms: `face: thin_plate`")));
 }
 
-// What a trial would refuse only after its skull was filled.
-TEST(Experiment, APriorThatIsAskedNamesItsFiles) {
+// Otherwise a trial would refuse these only after its skull was filled.
+TEST(Experiment, AUsedPriorNamesItsFiles) {
   EXPECT_THAT(Faults("prior: hspline\n"), HasSubstr("prior.modes: no file is named"));
   EXPECT_THAT(Faults("prior: modes\n"),
               AllOf(HasSubstr("prior.mean: no file"), HasSubstr("prior.features: no file")));
@@ -116,7 +115,8 @@ TEST(Experiment, APriorThatIsAskedNamesItsFiles) {
 
 TEST(Experiment, TheDefaultsFitTogether) { EXPECT_THAT(FaultsBetween(Experiment{}), IsEmpty()); }
 
-// configs/published.yaml over a subject: the way of the thesis, and the subject's own depths.
+// configs/published.yaml as a base of a subject gives the way of the thesis with the subject's
+// depths.
 TEST(Experiment, ThePublishedWayIsOneBaseAway) {
   const testing::ScratchFolder folder;
   const std::string configs = SEMBLANCE_SOURCE_DIR "/configs/";
@@ -159,7 +159,7 @@ TEST(Experiment, AllOptionsThatNameALevelAreLookedAt) {
               HasSubstr("1:44: fit.plan.finest: level 6"));
 }
 
-// Before anything runs, not after the implicit face is made.
+// The fault is found before anything runs, not after the implicit face was made.
 TEST(Experiment, WhatAPlanCannotIsToldWhenTheFileIsRead) {
   EXPECT_THAT(Faults("fit: {plan: adaptive}\n"),
               HasSubstr("1:13: fit.plan.finest: level 4 is finer than the surface"));
@@ -195,7 +195,7 @@ TEST(Experiment, ThePlanThatKnowsNoFeaturesIsNotForATemplateThatHasSome) {
   EXPECT_NO_THROW(ReadConfigText<Experiment>(fit + "template: ict\nface: placed\n", "a.yaml"));
 }
 
-// What a plan does not use is no key of it.
+// A plan has no key for an option that it does not use.
 TEST(Experiment, APlanOwnsItsOptions) {
   EXPECT_THAT(Faults("fit: {plan: {type: adaptive, finest: 2, sweeps: 1}}\n"),
               AllOf(StartsWith("a.yaml:1:41: "), HasSubstr("fit.plan.sweeps")));
@@ -212,8 +212,8 @@ TEST(Experiment, AFaultOfADefaultIsToldWhereTheFileComesNearest) {
                     HasSubstr("fit.plan.schedule[5].level")));
 }
 
-// Checks each default that the reference and the schema state against `node`, a part of the tree
-// that resolved.yaml is written from.
+// Compares each default of the reference and the schema with `node`, a part of the tree from which
+// resolved.yaml is written.
 class StatedDefaults {
  public:
   void Check(const ConfigNode& node, const Json& schema, const std::string& path,
@@ -287,7 +287,7 @@ TEST(Experiment, AMeanOfATableIsForDepthsThatAreNotTheTables) {
     const std::string interp = fmt::format("interp: {{type: {}, mean: table}}\n", scheme);
     EXPECT_THAT(Faults(interp), HasSubstr("interp.mean: the depths are the table's own"));
     EXPECT_THAT(Faults(interp + "tissue: {depths: measured}\n"),
-                HasSubstr("interp.mean: `table` takes the mean depths of tissue.table"));
+                HasSubstr("interp.mean: `table` needs the mean depths of tissue.table"));
     const std::string both = interp + "tissue: {depths: measured, table: a.yaml}\n";
     EXPECT_NO_THROW(ReadConfigText<Experiment>(both, "a.yaml"));
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Dowels beside those of the landmarks, on a small phantom.
+// Dowels in addition to those of the landmarks, on a small phantom.
 #include "problems/pipeline/extra_dowels.h"
 
 #include <fmt/format.h>
@@ -74,8 +74,9 @@ TEST(ExtraDowels, TheInterpolatedDepthChangesNoOtherDowel) {
   EXPECT_EQ(was.subject.network.areas.size() + 2, is.subject.network.areas.size());
 }
 
-// 4 mm more than is interpolated in the middle of the cheek: the implicit face comes out to the
-// tip, but for what the emitters round off a cone of depths no broader than they reach (2.0 mm).
+// The depth in the middle of the cheek is 4 mm more than interpolated. The implicit face comes out
+// to the tip within 2.0 mm: the emitters round off a cone of depths that is no broader than their
+// reach.
 TEST(ExtraDowels, PullTheImplicitFaceToTheirTips) {
   constexpr char kMiddle[] = "near: [zy_l, mr_l, sM2_l]";
   const std::vector<std::string> fine = {"subject.rings=80", "implicit.resolution=70"};
@@ -130,13 +131,13 @@ TEST(ExtraDowels, ADepthThatIsNotStatedIsTheTissuesWithAllThatItSays) {
   EXPECT_EQ(At(measured.dowels_on_bone, "mn").depth_mm, 7);
 }
 
-TEST(ExtraDowels, WhatCannotBePlacedIsToldInOneLine) {
+TEST(ExtraDowels, SitesThatCannotBePlacedAreNamedInOneLine) {
   const auto words = [](const std::string& sites, std::vector<std::string> overrides = {}) {
     return WordsOf<InputError>([&] { CaseOf(Phantom30(sites, std::move(overrides))); });
   };
   EXPECT_THAT(words("n: {near: [0, 0, 0], depth: 3}"),
               HasSubstr("sites.n: n (Nasion) appears twice, as it is among the landmarks"));
-  EXPECT_THAT(words("mine: {near: n, depth: 3}"), HasSubstr("stands where n (Nasion) stands"));
+  EXPECT_THAT(words("mine: {near: n, depth: 3}"), HasSubstr("at the same place as n (Nasion)"));
   EXPECT_THAT(words("mine: {near: [n, rhi]}"), HasSubstr("sites.mine: no depth is given"));
   EXPECT_THAT(words("mine: {near: [0, -300, 0], depth: 3}"), HasSubstr("mm from the skull"));
   EXPECT_THAT(words("mn: {depth: 3}"), HasSubstr("sites.mn: mn (Mid-nasal) is not among the"));

@@ -25,7 +25,8 @@ RunResult RunPhantom(std::vector<std::string> overrides) {
 
 double MedianSigma(const RunResult& result) { return result.uncertainty->median_mm; }
 
-// The exact face of phantoms lies in the 90 % interval of the recovered one on nine tenths of it.
+// The exact face of phantoms lies in the 90 % interval of the recovered one on nine tenths of its
+// area.
 TEST(Uncertainty, NinetyPercentIntervalsHoldNineTenthsOfThePhantomsFaces) {
   double share = 0, area = 0;
   for (const int random_seed : {1, 2, 3}) {
@@ -48,7 +49,7 @@ TEST(Uncertainty, GrowsWithTheDowels) {
   EXPECT_LT(MedianSigma(measured), std::hypot(MedianSigma(exact), 5));
 }
 
-TEST(Uncertainty, IsGivenAsItIsAskedFor) {
+TEST(Uncertainty, HasOnlyTheRequestedParts) {
   const RunResult none = RunPhantom({"uncertainty.sigma=false"});
   EXPECT_FALSE(none.uncertainty);
   const RunResult two = RunPhantom({"uncertainty.sigma=false", "uncertainty.samples=2"});
@@ -57,14 +58,15 @@ TEST(Uncertainty, IsGivenAsItIsAskedFor) {
   EXPECT_NE(two.uncertainty->samples[0].Offsets(), two.uncertainty->samples[1].Offsets());
 }
 
-TEST(Uncertainty, ATermThatCannotBeTakenIntoAccountIsNoted) {
+TEST(Uncertainty, ATermThatIsLeftOutIsNoted) {
   const RunResult result =
       RunPhantom({"fit.terms=[points, smoothness, membrane, {type: symmetry, weight: 0.1}]"});
   EXPECT_THAT(result.uncertainty->left_out, ::testing::ElementsAre("symmetry"));
   EXPECT_THAT(result.subject.notes, ::testing::Contains(::testing::HasSubstr("'symmetry'")));
 }
 
-// Two spheres 1.5 mm apart: all within 1 sd of 2 mm at 68 %, none at 30 %.
+// Two spheres lie 1.5 mm apart and sigma is 2 mm: the 70 % interval covers all, the 30 % one
+// nothing.
 TEST(Uncertainty, CoverageIsTheShareOfTheSkinWithin) {
   const TriMesh skin = testing::SphereMesh({0, 0, 0}, 80, 30),
                 face = testing::SphereMesh({0, 0, 0}, 81.5, 30);
@@ -81,8 +83,8 @@ TEST(Uncertainty, CoverageIsTheShareOfTheSkinWithin) {
   EXPECT_TRUE(std::isnan(MeasureCoverage({skin, apart}, face, sigma, mask, {}).at_90));
 }
 
-// The upper half is 1.5 mm apart, the lower 6 mm, and sigma says 2 mm of both.
-TEST(Uncertainty, CoverageIsToldByPart) {
+// The upper halves are 1.5 mm apart, the lower ones 6 mm. Sigma is 2 mm everywhere.
+TEST(Uncertainty, CoverageIsMeasuredByPart) {
   const TriMesh skin = testing::SphereMesh({0, 0, 0}, 80, 30),
                 face = testing::SphereMesh({0, 0, 0}, 81.5, 30);
   std::vector<double> apart;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A prior whose mean is the built-in template, so that all can be compared with it.
+// The mean of these priors is the built-in template, with which everything can be compared.
 #include "problems/prior/face_prior.h"
 
 #include <fmt/format.h>
@@ -13,7 +13,7 @@
 
 #include "problems/face_template/template_source.h"
 #include "problems/prior/hspline_prior.h"
-#include "problems/prior/prior_target.h"
+#include "problems/prior/prior_observations.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
@@ -54,7 +54,7 @@ std::string ModesFile(const TriMesh& mean, int modes) {
          std::string(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(float));
 }
 
-// Where the landmark of Multi-PIE is, each at a place of its own.
+// The place of a landmark of Multi-PIE. All places differ.
 Vec3 LandmarkPoint(int n) { return Face().surface.Point({0.4 + 0.005 * (n - 28), 0.5}); }
 
 // The files of a prior with two modes; its landmarks are in reverse order.
@@ -95,7 +95,7 @@ TEST(FacePrior, ItsFilesAreRead) {
   EXPECT_EQ(LoadPrior(first).model.Modes(), 1);
 }
 
-// What LoadPrior says of a prior that is spoilt, "none" if nothing.
+// The message of LoadPrior for a spoilt prior; "none" if it accepts the prior.
 std::string FaultOf(const fs::path& folder, const std::function<void(ModesPrior&)>& spoil) {
   ModesPrior prior = WritePrior(folder);
   spoil(prior);
@@ -219,7 +219,7 @@ TEST(FacePrior, AnArrayWithoutAModeAndAMeanWithoutAnOrderAreNamed) {
   }
 }
 
-// The modes of WritePrior as meshes, of every kind, beside files that are none.
+// The modes of WritePrior as meshes of every format, next to files that are no meshes.
 ModesPrior WithFolder(ModesPrior prior) {
   const FacePrior array = LoadPrior(prior);
   prior.modes.replace_filename("faces");
@@ -295,7 +295,7 @@ TEST(FacePrior, AFolderThatHoldsNoModesIsNamed) {
 
 TEST(DomainGrid, SurfaceThroughItsOwnSamplesIsTheSurface) {
   const HSplineSurface& surface = Face().surface;
-  const DomainGrid grid = GridOf(surface.shape());
+  const DomainGrid grid = MakeDomainGrid(surface.shape());
   std::vector<Vec3> samples;
   for (std::size_t k = 0; k < grid.size(); ++k) {
     samples.push_back(surface.Point(grid.UvAt(k)));
@@ -305,7 +305,7 @@ TEST(DomainGrid, SurfaceThroughItsOwnSamplesIsTheSurface) {
     EXPECT_LT((again.Point(grid.UvAt(k)) - samples[k]).norm(), 0.05);
     EXPECT_EQ(grid.NearestTo(grid.UvAt(k)), k);
   }
-  EXPECT_THAT(testing::WordsOf<InputError>([] { GridOf({.closure = Closure::kPeriodicU}); }),
+  EXPECT_THAT(testing::WordsOf<InputError>([] { MakeDomainGrid({.closure = Closure::kPeriodicU}); }),
               HasSubstr("needs one that is open"));
 }
 
@@ -321,7 +321,8 @@ TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
     estimate.points.push_back(estimate.subject_from_model * p);
   }
   estimate.sigma_mm.assign(estimate.points.size(), 1.5);
-  const HSplineSurface surface = SurfaceOf(estimate, prior, on_template, Face().surface.shape());
+  const HSplineSurface surface =
+      MakeFaceSurface(estimate, prior, on_template, Face().surface.shape());
   for (const Vec2& uv : {Vec2(0.3, 0.4), Vec2(0.5, 0.5), Vec2(0.62, 0.7)}) {
     const Vec3 p = Face().surface.Point(uv);
     const double s = std::sin(0.02 * p.z()) - std::sin(0.04 * p.z());
@@ -341,8 +342,9 @@ TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
   }
   const std::vector<Vec2> middle = {Vec2(0.5, 0.5)};
   EXPECT_NEAR(SigmaAt(middle, estimate, prior, on_template)[0], 1.5, 1e-12);
-  // What a fit is held to, and what of the implicit face it does not follow.
-  const std::vector<ShapePoint> points = ShapePointsOf(surface, estimate, prior, on_template);
+  // The points to which a fit is held, and the features at which it does not follow the implicit
+  // face.
+  const std::vector<ShapePoint> points = SampleShape(surface, estimate, prior, on_template);
   ASSERT_EQ(points.size(), 64u * 64);
   double area = 0;
   for (const ShapePoint& point : points) {
@@ -360,7 +362,7 @@ TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
   EXPECT_LT((features[0].center - moved).norm(), 1);
 }
 
-// The program carries what configs/faces/ict has.
+// The program contains the files of configs/faces/ict.
 TEST(IctFace, IsThatOfTheFiles) {
   const fs::path folder = SEMBLANCE_SOURCE_DIR "/configs/faces/ict";
   const TemplateFace carried = LoadTemplate(IctTemplate{}),
@@ -388,7 +390,7 @@ TEST(HSplinePrior, ModesOnTheTemplateMoveItAsTheMeshsModesDo) {
   EXPECT_LT(misfit.rms_mm, 0.05);
   const HSplineModes again = HSplineModesFromJson(HSplineModesToJson(modes), "modes.json");
   EXPECT_EQ(again.features.size(), 41u);
-  const FacePrior prior = PriorOf(again, Face(), 100);
+  const FacePrior prior = MakePrior(again, Face(), 100);
   EXPECT_EQ(prior.model.Modes(), 2);
   EXPECT_EQ(prior.sites.size(), 32u);
   for (int n = 28; n <= 68; ++n) {
@@ -428,7 +430,7 @@ TEST(HSplinePrior, WhatCannotBeUsedIsNamed) {
   HSplineModes modes;
   modes.shape = {.patches_u = 4, .patches_v = 4, .max_level = 0};
   modes.level = 0;
-  EXPECT_THROW(PriorOf(modes, Face(), 1), InputError);
+  EXPECT_THROW(MakePrior(modes, Face(), 1), InputError);
   EXPECT_THROW(LoadPrior(NoPrior{}, Face()), InputError);
 }
 

@@ -50,10 +50,10 @@ std::vector<std::string> Names(const RuleMarks& marks) {
 }
 
 TEST(FeatureRules, ARuleIsOnWhenItsPointsAreThere) {
-  EXPECT_THAT(Names(MarksOfRules({}, AverageLandmarks(), {}, Ict())),
+  EXPECT_THAT(Names(ApplyRules({}, AverageLandmarks(), {}, Ict())),
               ::testing::ElementsAre("eye_height eye_r height", "eye_height eye_l height"));
   EXPECT_THAT(
-      Names(MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict())),
+      Names(ApplyRules(AllRules(), AverageLandmarks(), {}, Ict())),
       ::testing::ElementsAre("eye_height eye_r height", "eye_height eye_l height",
                              "eye_protrusion eye_r front", "eye_protrusion eye_l front",
                              "mouth_width ch_r side", "mouth_width ch_l side",
@@ -61,7 +61,7 @@ TEST(FeatureRules, ARuleIsOnWhenItsPointsAreThere) {
   FeatureRules off = AllRules();
   off.eye_height.use = off.eye_protrusion.use = off.mouth_width.use = off.pronasale.use = false;
   off.subnasale.use = false;
-  EXPECT_TRUE(MarksOfRules(off, AverageLandmarks(), {}, Ict()).marks.empty());
+  EXPECT_TRUE(ApplyRules(off, AverageLandmarks(), {}, Ict()).marks.empty());
 }
 
 TEST(FeatureRules, PointsStandOnTheBoneAndOnTheirSide) {
@@ -70,7 +70,7 @@ TEST(FeatureRules, PointsStandOnTheBoneAndOnTheirSide) {
   const auto mistakes = [&](const char* left, const char* right, const Similarity* known) {
     FeatureRules rules;
     rules.points = {{left, {36, -48, 0}}, {right, {-36, -48, 0}}, {"ss", {0, -60, 0}}};
-    return MistakesOfRulePoints(rules, ball, known, {});
+    return CheckRulePoints(rules, ball, known, {});
   };
   EXPECT_THAT(mistakes("uc_l", "uc_r", &pose), IsEmpty());
   EXPECT_THAT(mistakes("uc_r", "uc_l", &pose),
@@ -79,12 +79,12 @@ TEST(FeatureRules, PointsStandOnTheBoneAndOnTheirSide) {
   EXPECT_THAT(mistakes("uc_r", "uc_l", nullptr), IsEmpty());  // of a pose that is not known
   FeatureRules far;
   far.points = {{"uc_l", {18000, 0, -60}}};
-  EXPECT_THAT(MistakesOfRulePoints(far, ball, &pose, {}),
+  EXPECT_THAT(CheckRulePoints(far, ball, &pose, {}),
               ElementsAre(HasSubstr("rules.points.uc_l: it is 17940.1 mm from the skull")));
 }
 
-TEST(FeatureRules, PredictWhatTheirFormulasSay) {
-  const RuleMarks all = MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict());
+TEST(FeatureRules, PredictionsFollowTheFormulas) {
+  const RuleMarks all = ApplyRules(AllRules(), AverageLandmarks(), {}, Ict());
   const auto mark = [&](std::size_t k) { return all.marks.at(k).position; };
   const double upper = AverageSite("mso_l").z(), lower = AverageSite("mio_l").z();
   EXPECT_NEAR(mark(1).z(), upper - 0.441 * (upper - lower), 1e-9);
@@ -102,9 +102,9 @@ TEST(FeatureRules, PredictWhatTheirFormulasSay) {
   EXPECT_NEAR(mark(8).y(), 2 - 13.5, 1e-9);
 }
 
-// The marks are of the landmarks that they are called after: the mean's own eyes, corners and tip.
+// The marks lie on the landmarks of their names: the mean's own eyes, corners and tip.
 TEST(FeatureRules, MarksLieOnTheirLandmarks) {
-  const RuleMarks all = MarksOfRules(AllRules(), AverageLandmarks(), {}, Ict());
+  const RuleMarks all = ApplyRules(AllRules(), AverageLandmarks(), {}, Ict());
   const TriMesh& mean = Ict().model.mean;
   const auto at = [&](std::size_t k) {
     return PositionOf(all.marks.at(k).at.front(), mean, mean.points);
@@ -126,7 +126,7 @@ TEST(FeatureRules, AnEstimateFollowsAMark) {
     tip.position = PositionOf(at, Ict().model.mean, Ict().model.mean.points);
     target.tips.push_back(tip);
   }
-  RuleMarks rules = MarksOfRules({}, AverageLandmarks(), {}, Ict());
+  RuleMarks rules = ApplyRules({}, AverageLandmarks(), {}, Ict());
   ShapeMark mark = rules.marks.at(0);
   const Vec3 eye = PositionOf(mark.at.front(), Ict().model.mean, Ict().model.mean.points);
   mark.position = eye + 3 * Vec3::UnitZ();
@@ -145,49 +145,50 @@ TEST(FeatureRules, AnEstimateFollowsAMark) {
   EXPECT_THROW(EstimateShape(Ict().model, target, options, {}), InputError);
 }
 
-TEST(FeatureRules, ARuleThatIsAskedForSaysWhatItLacks) {
+TEST(FeatureRules, TheNoteOfARequestedRuleNamesWhatItLacks) {
   FeatureRules rules;
-  EXPECT_THAT(NotesOnRules(rules, {}, /*is_posed=*/true, &Ict()),
-              IsEmpty());  // nobody asked for these
+  EXPECT_THAT(ExplainUnusedRules(rules, {}, /*is_posed=*/true, &Ict()),
+              IsEmpty());  // none of these was requested
   rules.pronasale.use = rules.mouth_width.use = true;
-  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, &Ict()),
+  EXPECT_THAT(ExplainUnusedRules(rules, AverageLandmarks(), /*is_posed=*/true, &Ict()),
               ElementsAre("rules.mouth_width is on, and it lacks uc_l, uc_r under rules.points: it "
                           "does not apply",
                           "rules.pronasale is on, and it lacks ans, ss under rules.points: it does "
                           "not apply"));
   rules.mouth_width.use = false;
   rules.points = AllRules().points;
-  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, &Ict()), IsEmpty());
+  EXPECT_THAT(ExplainUnusedRules(rules, AverageLandmarks(), /*is_posed=*/true, &Ict()), IsEmpty());
   rules.points.erase("ss");
-  EXPECT_THAT(NotesOnRules(rules, {}, /*is_posed=*/true, &Ict()),
+  EXPECT_THAT(ExplainUnusedRules(rules, {}, /*is_posed=*/true, &Ict()),
               ElementsAre(HasSubstr("it lacks ss under rules.points and n, pr, rhi among the "
                                     "landmarks: it does not apply")));
-  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/false, &Ict()),
+  EXPECT_THAT(ExplainUnusedRules(rules, AverageLandmarks(), /*is_posed=*/false, &Ict()),
               ElementsAre(HasSubstr("rules.pronasale is on, and the skull's pose is not known")));
-  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, nullptr),
-              ElementsAre(HasSubstr("rules.pronasale is on, and the face asks no prior")));
+  EXPECT_THAT(ExplainUnusedRules(rules, AverageLandmarks(), /*is_posed=*/true, nullptr),
+              ElementsAre(HasSubstr("rules.pronasale is on, and the face uses no prior")));
 }
 
 TEST(FeatureRules, APriorWithoutTheirLandmarksIsNoted) {
   FacePrior few = Ict();
   few.features.resize(33);
   FeatureRules rules;
-  EXPECT_TRUE(MarksOfRules(rules, AverageLandmarks(), {}, few).marks.empty());
-  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, &few),
+  EXPECT_TRUE(ApplyRules(rules, AverageLandmarks(), {}, few).marks.empty());
+  EXPECT_THAT(ExplainUnusedRules(rules, AverageLandmarks(), /*is_posed=*/true, &few),
               ElementsAre(HasSubstr("the prior has 33 landmarks, and rules need 41")));
   rules.eye_height.use = rules.eye_protrusion.use = rules.mouth_width.use = false;
   rules.pronasale.use = rules.subnasale.use = false;
-  EXPECT_THAT(NotesOnRules(rules, AverageLandmarks(), /*is_posed=*/true, &few), IsEmpty());
+  EXPECT_THAT(ExplainUnusedRules(rules, AverageLandmarks(), /*is_posed=*/true, &few), IsEmpty());
 }
 
-// Whatever point is missing, a rule is noted as idle if it is, and as half at work if it is.
-TEST(FeatureRules, NotesSayWhatRulesDo) {
+// Whatever point is missing, the notes state correctly whether a rule applies to no side or to one.
+TEST(FeatureRules, NotesMatchTheAppliedRules) {
   FeatureRules all = AllRules();
   all.eye_height.use = all.mouth_width.use = true;
-  const std::vector<std::string> whole = Names(MarksOfRules(all, AverageLandmarks(), {}, Ict()));
+  const std::vector<std::string> whole = Names(ApplyRules(all, AverageLandmarks(), {}, Ict()));
   const auto expect_told = [&](const FeatureRules& rules, const std::map<std::string, Vec3>& bone) {
-    const std::vector<std::string> names = Names(MarksOfRules(rules, bone, {}, Ict()));
-    const std::vector<std::string> notes = NotesOnRules(rules, bone, /*is_posed=*/true, &Ict());
+    const std::vector<std::string> names = Names(ApplyRules(rules, bone, {}, Ict()));
+    const std::vector<std::string> notes =
+        ExplainUnusedRules(rules, bone, /*is_posed=*/true, &Ict());
     for (const std::string rule :
          {"eye_height", "eye_protrusion", "mouth_width", "pronasale", "subnasale"}) {
       const auto of_rule = [&](const std::string& name) { return name.starts_with(rule + " "); };
@@ -218,10 +219,10 @@ TEST(FeatureRules, NotesSayWhatRulesDo) {
 TEST(FeatureRules, AnUnknownPointIsAFault) {
   FeatureRules rules;
   rules.points["acanthion"] = {0, 0, 0};
-  ASSERT_EQ(FaultsOfRules(rules).size(), 1u);
-  EXPECT_EQ(FaultsOfRules(rules)[0].path, "points.acanthion");
-  EXPECT_THAT(FaultsOfRules(rules)[0].what, HasSubstr("dlom_l, dlom_r, uc_l, uc_r, ans, ss"));
-  EXPECT_TRUE(FaultsOfRules(AllRules()).empty());
+  ASSERT_EQ(CheckRules(rules).size(), 1u);
+  EXPECT_EQ(CheckRules(rules)[0].path, "points.acanthion");
+  EXPECT_THAT(CheckRules(rules)[0].what, HasSubstr("dlom_l, dlom_r, uc_l, uc_r, ans, ss"));
+  EXPECT_TRUE(CheckRules(AllRules()).empty());
 }
 
 }  // namespace

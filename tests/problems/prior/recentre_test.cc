@@ -13,8 +13,8 @@ namespace {
 
 constexpr double kMovedMm = 1.5;
 
-// Faces of a population whose mean lies 1.5 mm outside the model's on the forehead, and whose
-// glabella is 6 mm higher than the model has it.
+// Faces of a population. On the forehead its mean lies 1.5 mm outside the model's, and its glabella
+// is 6 mm higher than the model's.
 struct Heads {
   TemplateFace face = LoadTemplate(IctTemplate{});
   FacePrior prior = LoadPrior(IctPrior{.count = 3}, face);
@@ -59,7 +59,7 @@ TEST(Recentre, SitesGoToTheTipsAndTheMeanToTheSkin) {
                       heads.face.surface.Point(heads.face.site_uv.at("g")))
                          .z();
   EXPECT_NEAR(way, 3, 0.8);
-  // Of the mean less than that, for the estimate's smooth rest follows the dowels around.
+  // The mean moves less than that, because the estimate's smooth rest follows the dowels nearby.
   const Vec2 uv(0.5, 0.8);
   const double moved = (result.face.surface.Point(uv) - heads.face.surface.Point(uv))
                            .dot(heads.face.surface.Normal(uv));
@@ -68,7 +68,7 @@ TEST(Recentre, SitesGoToTheTipsAndTheMeanToTheSkin) {
   EXPECT_NEAR(result.face.site_uv.at("n").x(), 0.5, 1e-12);
 }
 
-TEST(Recentre, ATipWithoutSkinSaysNothingOfItsSite) {
+TEST(Recentre, ATipWithoutSkinDoesNotMoveItsSite) {
   const Heads heads;
   std::vector<bool> keep;
   for (const Triangle& t : heads.skin.triangles) {
@@ -78,7 +78,7 @@ TEST(Recentre, ATipWithoutSkinSaysNothingOfItsSite) {
   const Recentred result = Recentre(heads.prior, heads.on_template, heads.face, known, {},
                                     {.on_event = {}, .stop_token = {}, .threads = 2});
   EXPECT_NEAR((result.face.site_uv.at("g") - heads.face.site_uv.at("g")).norm(), 0, 1e-12);
-  EXPECT_EQ(result.face.surface.Offsets(), heads.face.surface.Offsets());  // nobody asked for it
+  EXPECT_EQ(result.face.surface.Offsets(), heads.face.surface.Offsets());  // move_mean is false
 }
 
 }  // namespace

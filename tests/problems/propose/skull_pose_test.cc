@@ -47,8 +47,7 @@ TEST(SkullPose, AStepGoesMostOfASmallWay) {
       matches.push_back({.from = found * p.position,
                          .to = small * p.position,
                          .normal = p.normal,
-                         .distance_mm = 0,
-                         .faces_alike = true});
+                         .distance_mm = 0});
     }
     found = StepTowards(matches, /*scale_too=*/true) * found;
   }

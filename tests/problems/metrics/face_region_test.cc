@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/metrics/scored_skin.h"
+#include "problems/metrics/face_region.h"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/pipeline/dowel_projection.h"
+#include "problems/pipeline/dowel_placement.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-// The shell: a ball of 50 mm. A dowel stands at a radius, outward.
+// The shell is a ball of 50 mm. The dowel points outward from a base at a given radius.
 Dowel DowelAt(double radius_mm, double depth_mm, const Vec3& direction = Vec3(1, 2, 3)) {
   const Vec3 unit = direction.normalized();
   return {"g", radius_mm * unit, unit, depth_mm, kNaN};
@@ -68,7 +68,8 @@ TEST_F(ShellDowelsTest, PressedInADowelReachesOutAsFarAsAsked) {
 
 TEST_F(ShellDowelsTest, PressedInItStaysOutsideBoneAndTheRestStaysToTheBit) {
   const std::vector<Dowel> dowels = {DowelAt(40, 6)};
-  const TriMesh bone = testing::SphereMesh({0, 0, 0}, 47, 120);  // in the way: 7 mm were asked
+  const TriMesh bone =
+      testing::SphereMesh({0, 0, 0}, 47, 120);  // bone stops the dimple, which should be 7 mm deep
   const TriMesh pressed = IndentShell(shell_, dowels, bone, 3);
   const Vec3 at = 50 * dowels[0].direction;
   double least = 50;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/face_template/template_io.h"
+#include "problems/face_template/template_source.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -34,7 +34,7 @@ class TemplateIo : public ::testing::Test {
     return WriteTemplate(folder_.Path(), face);
   }
 
-  // The message of reading the good template, its features changed by `edit`.
+  // The message of reading a good template whose features were changed by `edit`.
   template <class Edit>
   std::string MessageAfter(const Edit& edit) const {
     const FileTemplate files = Written();
@@ -85,11 +85,11 @@ TEST_F(TemplateIo, RoundTripIsExact) {
 TEST_F(TemplateIo, SecondWritingGivesTheSameBytes) {
   const FileTemplate files = Written();
   std::vector<std::string> first, second;
-  for (const std::filesystem::path& file : FilesOf(files)) {
+  for (const std::filesystem::path& file : TemplateFiles(files)) {
     first.push_back(ReadFileBytes(file));
   }
   EXPECT_EQ(first.size(), 3);
-  for (const std::filesystem::path& file : FilesOf(Written(ReadTemplate(files)))) {
+  for (const std::filesystem::path& file : TemplateFiles(Written(ReadTemplate(files)))) {
     second.push_back(ReadFileBytes(file));
   }
   EXPECT_EQ(first, second);
@@ -108,7 +108,7 @@ TEST_F(TemplateIo, AFaceNeedsNoFeatures) {
   FileTemplate files = Written();
   files.features.clear();
   EXPECT_TRUE(ReadTemplate(files).features.empty());
-  EXPECT_EQ(FilesOf(files).size(), 2);
+  EXPECT_EQ(TemplateFiles(files).size(), 2);
 }
 
 TEST_F(TemplateIo, NamesASiteThatIsMissingOrTwiceOrOutsideTheDomain) {
@@ -153,7 +153,7 @@ TEST_F(TemplateIo, NamesAVertexThatTheSurfaceDoesNotHave) {
               }),
               HasSubstr("levels 1 to 2"));
   EXPECT_THAT(MessageAfter([](auto& json) {
-                json["features"][1]["vertices"][0] = {1, 4294967297, 1};  // 1 where it is cut
+                json["features"][1]["vertices"][0] = {1, 4294967297, 1};  // truncation would give 1
               }),
               HasSubstr("[1,4294967297,1]; it must be a list of 3 integers below a million"));
 }

@@ -1,19 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/pipeline/dowel_projection.h"
+#include "problems/pipeline/dowel_placement.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <optional>
 
 #include "problems/subject/sites.h"
+#include "surfaces/hspline_query/hspline_project.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {
 
-// How far along its dowel the shell lies over the base; 0 where it does not.
+constexpr double kFurthest_mm = 40;  // of the shell from a dowel's base or tip, along the dowel
+
+// The length of a dowel that lies under the shell; 0 if its base does not.
 double GapUnderShell(const Dowel& dowel, const TriMesh& shell, const MeshQuery& query) {
-  constexpr double kFurthest_mm = 40;
   double gap = 0;
   for (const MeshPoint& hit : query.AllHits(dowel.base, dowel.direction, kFurthest_mm)) {
     const Triangle& t = shell.triangles[hit.triangle];
@@ -23,43 +27,44 @@ double GapUnderShell(const Dowel& dowel, const TriMesh& shell, const MeshQuery& 
   return gap;
 }
 
-// The first way out of the shell, for a dowel that ends inside it; 0 if it is not inside.
+// For a dowel that ends inside the shell, the distance from its base to the first way out along it.
+// 0 for other dowels.
 double WayOut(const Dowel& dowel, const TriMesh& shell, const MeshQuery& query) {
-  constexpr double kFurthest_mm = 40;
   const auto hit = query.FirstHit(dowel.Tip(), dowel.direction, kFurthest_mm);
   const bool inside =
       hit && TriangleAreaVector(shell, shell.triangles[hit->triangle]).dot(dowel.direction) > 0;
   return inside ? dowel.depth_mm + hit->distance_mm : 0;
 }
 
-// How far along its dowel the shell lies over the base: also of a dowel that ends under the shell.
+// The height of the shell over the base, along the dowel, whether the dowel ends under the shell or
+// not.
 double HeightOfShell(const Dowel& dowel, const TriMesh& shell, const MeshQuery& query) {
   const double beyond = WayOut(dowel, shell, query);
   return beyond > 0 ? beyond : GapUnderShell(dowel, shell, query);
 }
 
-// Where the shell is too high.
+// A place at which the shell is too high.
 struct Dimple {
   Vec3 at, inward;
   double depth_mm = 0, radius_mm = 0;
 
-  // At a point; 0 far from it.
+  // The depth at a point; 0 beyond the radius.
   double DepthAt(const Vec3& p) const {
     const double r2 = (p - at).squaredNorm() / (radius_mm * radius_mm);
     return r2 < 1 ? depth_mm * (1 - r2) * (1 - r2) : 0;
   }
 };
 
-// How far p can go along `inward`, at most so far, until it meets bone: 0 on the bone, whichever
-// side of it rounding puts p.
+// The distance from p along `inward` to the bone, at most at_most_mm. The search starts a little
+// outside p, so that it is 0 on the bone whatever side of the bone rounding puts p on.
 double RoomOverBone(const Vec3& p, const Vec3& inward, double at_most_mm, const MeshQuery& bone) {
   constexpr double kBack_mm = 0.5;
   const auto hit = bone.FirstHit(p - kBack_mm * inward, inward, at_most_mm + kBack_mm);
   return hit ? std::max(0.0, hit->distance_mm - kBack_mm) : at_most_mm;
 }
 
-std::vector<Dimple> DimplesOf(std::span<const Dowel> dowels, const TriMesh& shell,
-                              double press_mm) {
+std::vector<Dimple> FindDimples(std::span<const Dowel> dowels, const TriMesh& shell,
+                                double press_mm) {
   const MeshQuery query(shell);
   std::vector<Dimple> dimples;
   for (const Dowel& dowel : dowels) {
@@ -79,7 +84,7 @@ std::vector<Dimple> DimplesOf(std::span<const Dowel> dowels, const TriMesh& shel
 TriMesh IndentShell(TriMesh shell, std::span<const Dowel> dowels_on_bone, const TriMesh& bone,
                     double press_mm) {
   const std::vector<Dimple> dimples =
-      press_mm > 0 ? DimplesOf(dowels_on_bone, shell, press_mm) : std::vector<Dimple>();
+      press_mm > 0 ? FindDimples(dowels_on_bone, shell, press_mm) : std::vector<Dimple>();
   if (dimples.empty()) {
     return shell;
   }
@@ -96,7 +101,7 @@ TriMesh IndentShell(TriMesh shell, std::span<const Dowel> dowels_on_bone, const 
 
 ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels_on_bone, const TriMesh& shell,
                                  double least_depth_mm) {
-  constexpr double kWorthSaying_mm = 1;
+  constexpr double kLeastNoted_mm = 1;  // smaller gaps are not worth a note
   const MeshQuery query(shell);
   ProjectedDowels result;
   for (Dowel dowel : dowels_on_bone) {
@@ -107,7 +112,7 @@ ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels_on_bone, const Tr
           "site {}: the dowel of {:.1f} mm ends {:.1f} mm under the shell; there the "
           "shell gets {:.1f} mm",
           SiteInWords(dowel.site), dowel.depth_mm, beyond - dowel.depth_mm, least_depth_mm));
-    } else if (gap >= kWorthSaying_mm) {
+    } else if (gap >= kLeastNoted_mm) {
       result.notes.push_back(
           fmt::format("site {}: the shell lies {:.1f} mm over the bone; of {:.1f} mm of tissue "
                       "{:.1f} mm are outside it",
@@ -119,6 +124,93 @@ ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels_on_bone, const Tr
     result.dowels_on_shell.push_back(dowel);
   }
   return result;
+}
+
+namespace {
+
+std::optional<Vec2> KnownUv(const std::string& site, const TemplateFace& face,
+                            const ExtraSites& sites) {
+  if (const auto by_hand = sites.find(site); by_hand != sites.end() && by_hand->second.uv) {
+    return Vec2((*by_hand->second.uv)[0], (*by_hand->second.uv)[1]);
+  }
+  const auto known = face.site_uv.find(site);
+  return known == face.site_uv.end() ? std::nullopt : std::optional(known->second);
+}
+
+void Add(const Dowel& dowel, const Vec2& uv, FitTarget& target) {
+  target.points.push_back(
+      {.label = dowel.site, .position = dowel.Tip(), .uv = uv, .role = dowel.role});
+  target.anchors.push_back({dowel.base, dowel.direction});
+}
+
+// Finds the points in which dowels meet a surface near their tips.
+class Rays {
+ public:
+  explicit Rays(const HSplineSurface& surface)
+      : surface_(surface),
+        mesh_(Tessellate(surface, kQuadsPerPatch)),
+        query_(mesh_.mesh),
+        projector_(surface) {}
+
+  Vec2 Meet(const Dowel& dowel) const {
+    constexpr double kBack_mm = 20, kFar_mm = 80;  // the ray starts under the base
+    const auto hit =
+        query_.FirstHit(dowel.base - kBack_mm * dowel.direction, dowel.direction, kFar_mm);
+    if (!hit) {
+      return projector_.Project(dowel.Tip()).uv;
+    }
+    int corner = 0;
+    hit->weights.maxCoeff(&corner);
+    return ProjectFrom(surface_, hit->position,
+                       mesh_.uv[mesh_.mesh.triangles[hit->triangle][corner]])
+        .uv;
+  }
+
+ private:
+  static constexpr int kQuadsPerPatch = 4;
+  const HSplineSurface& surface_;
+  Tessellation mesh_;
+  MeshQuery query_;
+  SurfaceProjector projector_;
+};
+
+}  // namespace
+
+FitTarget KnownDowels(std::span<const Dowel> dowels, const TemplateFace& face,
+                      const ExtraSites& sites) {
+  FitTarget target;
+  for (const Dowel& dowel : dowels) {
+    if (const auto uv = KnownUv(dowel.site, face, sites)) {
+      Add(dowel, *uv, target);
+    }
+  }
+  return target;
+}
+
+Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& known,
+                         const PlacementOptions& options) {
+  std::vector<Vec3> on_template, on_subject;
+  for (const FitPoint& point : known.points) {
+    on_template.push_back(generic.surface.Point(point.uv));
+    on_subject.push_back(point.position);
+  }
+  return PlaceTemplate(on_template, on_subject, {}, options);
+}
+
+FitTarget AllDowels(std::span<const Dowel> dowels, const TemplateFace& placed,
+                    const ExtraSites& sites) {
+  FitTarget target;
+  std::optional<Rays> rays;
+  for (const Dowel& dowel : dowels) {
+    std::optional<Vec2> uv = KnownUv(dowel.site, placed, sites);
+    if (!uv && !IsStandardSite(dowel.site)) {
+      uv = (rays ? *rays : rays.emplace(placed.surface)).Meet(dowel);
+    }
+    if (uv) {
+      Add(dowel, *uv, target);
+    }
+  }
+  return target;
 }
 
 }  // namespace semblance
