@@ -13,6 +13,7 @@
 #include "interp/kriging/gaussian_regression.h"
 #include "interp/on_surface/bone_geometry.h"
 #include "interp/on_surface/coarse_surface.h"
+#include "interp/on_surface/matern_field.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/dowel_scenes.h"
 
