@@ -9,7 +9,7 @@
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/pipeline/step_clock.h"
-#include "problems/preparation/bone_origin.h"
+#include "problems/preparation/mirror.h"
 #include "surfaces/mesh/cut_planes.h"
 
 namespace semblance {
