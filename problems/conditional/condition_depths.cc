@@ -18,8 +18,6 @@ namespace {
 // Lays a point on the left side of the head.
 Vec3 Folded(const Vec3& p) { return {std::abs(p.x()), p.y(), p.z()}; }
 
-bool IsSite(const std::string& name) { return IsStandardSite(name) || IsFurtherSite(name); }
-
 double CorrelationBetween(const SiteCorrelation& o, const std::string& a, const std::string& b) {
   if (!IsSite(a) || !IsSite(b)) {
     return 0;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "problems/subject/sites.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance {
@@ -14,8 +15,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kNormalFactor =
-    1.4826;  // sd over median absolute deviation of a normal distribution
+// The sd of a normal distribution divided by its median absolute deviation.
+constexpr double kNormalFactor = 1.4826;
 
 // (value - median) / robust deviation of the finite values; NaN elsewhere, and for too few values.
 std::vector<double> RobustZ(const std::vector<double>& values, double min_deviation) {

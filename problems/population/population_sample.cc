@@ -170,8 +170,6 @@ JointSample MakeSample(const std::vector<CountedSubject>& subjects, double least
   return sample;
 }
 
-bool IsSite(const std::string& name) { return IsStandardSite(name) || IsFurtherSite(name); }
-
 JointSample Varying(const JointSample& sample) {
   JointSample varying;
   std::vector<Index> columns;

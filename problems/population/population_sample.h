@@ -31,9 +31,6 @@ std::map<std::string, double> KnownCovariates(const CountedSubject& subject);
 // are NaN.
 JointSample MakeSample(const std::vector<CountedSubject>& subjects, double least_confidence);
 
-// True if a column is the depth of a site and not a covariate.
-bool IsSite(const std::string& name);
-
 // Removes the columns that fewer than two subjects have, or that are the same for all.
 JointSample Varying(const JointSample& sample);
 

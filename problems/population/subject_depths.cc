@@ -290,7 +290,7 @@ double ReadNumber(const Json& json) {
 
 std::string ReadSite(const Json& json) {
   const auto site = json.get<std::string>();
-  if (!IsStandardSite(site) && !IsFurtherSite(site)) {
+  if (!IsSite(site)) {
     throw IoError(fmt::format("a subject's depths: '{}' is not a known site", site));
   }
   return site;

@@ -206,16 +206,12 @@ class Proposer {
   // Concludes the axes of the skull's file from its pose; a note asks to turn a skull that is
   // oblique.
   void FindAxes() {
-    constexpr double kMaxTurn_deg = 60;  // as FindLandmarkMistakes
     const Mat3& turned = proposal_.skull_from_average.rotation;
-    const auto degrees = [](const Mat3& r) {
-      return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi;
-    };
-    const Mat3 ras = Vec3(-1, -1, 1).asDiagonal();
-    if (degrees(turned) <= kMaxTurn_deg) {
+    const PoseAxes axes = FindPoseAxes(turned);
+    if (axes == PoseAxes::kLps) {
       return;
     }
-    if (degrees(ras * turned) <= kMaxTurn_deg) {
+    if (axes == PoseAxes::kRas) {
       proposal_.axes = "RAS";
       proposal_.notes.push_back(fmt::format(
           "{}: the face looks to +y: the skull is RAS, and so are the proposed points (`axes: "

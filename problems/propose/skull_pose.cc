@@ -21,8 +21,8 @@ namespace {
 
 constexpr double kMaxDistance_mm = 15;  // a larger distance carries no more information
 constexpr double kMinScale = 0.7, kMaxScale = 1.4;
-constexpr double kKept =
-    0.7;  // fraction of the matches; the rest are parts that only one skull has
+// Fraction of the matches that is kept; the rest are parts that only one skull has.
+constexpr double kKept = 0.7;
 
 // A stage of the search. Each stage refines fewer poses on more points than the one before.
 struct Stage {

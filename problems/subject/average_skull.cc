@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "fitting/problem/placement.h"
 #include "interp/dowels/site_code.h"
@@ -155,6 +156,18 @@ SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand) {
   std::vector<double> sorted = fit.residual_mm;
   fit.median_mm = UpperMedian(sorted);
   return fit;
+}
+
+PoseAxes FindPoseAxes(const Mat3& skull_from_average) {
+  constexpr double kMaxTurn_deg = 60;
+  const auto is_upright = [](const Mat3& r) {
+    return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi <= kMaxTurn_deg;
+  };
+  if (is_upright(skull_from_average)) {
+    return PoseAxes::kLps;
+  }
+  const Mat3 ras = Vec3(-1, -1, 1).asDiagonal();
+  return is_upright(ras * skull_from_average) ? PoseAxes::kRas : PoseAxes::kNeither;
 }
 
 Vec3 SkullSites::InAverage(const Vec3& point) const {

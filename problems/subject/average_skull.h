@@ -39,6 +39,12 @@ enum class Handedness { kAsIs, kMirrored };
 // than three sites, or if all lie on a line.
 SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand = Handedness::kAsIs);
 
+// The axes that a skull's pose suggests: its rotation is within 60 degrees of that of a head in
+// LPS, or in RAS, or neither. The limit lies between a tilted head and exchanged axes, which are 90
+// apart.
+enum class PoseAxes { kLps, kRas, kNeither };
+PoseAxes FindPoseAxes(const Mat3& skull_from_average);
+
 // The pose of a skull and its 32 standard sites. A site without a landmark is predicted.
 struct SkullSites {
   Similarity skull_from_average;

@@ -51,9 +51,7 @@ SitePlace ReadLandmarkNames(const std::vector<ConfigNode>& nodes) {
 }
 
 // True for the code of a pair without its side.
-bool LacksSide(const std::string& name) {
-  return IsStandardSite(name + "_l") || IsFurtherSite(name + "_l");
-}
+bool LacksSide(const std::string& name) { return IsSite(name + "_l"); }
 
 }  // namespace
 

@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <span>
 
@@ -213,17 +212,12 @@ class MistakeSearch {
   }
 
   bool HasWrongPose() {
-    constexpr double kMaxTurn_deg =
-        60;  // between a tilted head and exchanged axes, which are 90 apart
     const Mat3& turned = fit_->skull_from_average.rotation;
-    const auto degrees = [](const Mat3& r) {
-      return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi;
-    };
-    if (degrees(turned) <= kMaxTurn_deg) {
+    const PoseAxes axes = FindPoseAxes(turned);
+    if (axes == PoseAxes::kLps) {
       return false;
     }
-    const Mat3 ras = Vec3(-1, -1, 1).asDiagonal();
-    if (degrees(ras * turned) <= kMaxTurn_deg) {
+    if (axes == PoseAxes::kRas) {
       return Error(
           "the face looks to +y: with x and y negated the sites fit an average skull within {:.1f} "
           "mm (median): skull and landmarks are RAS; write `axes: RAS` under `subject` and in the "

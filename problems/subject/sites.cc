@@ -220,6 +220,7 @@ std::string MirrorOf(std::string_view code) {
 
 bool IsStandardSite(std::string_view site) { return Contains(StandardSites(), site); }
 bool IsFurtherSite(std::string_view site) { return Contains(FurtherSites(), site); }
+bool IsSite(std::string_view name) { return FindSite(name) != nullptr; }
 
 std::vector<std::string> StandardSiteCodes() {
   std::vector<std::string> codes;
@@ -237,7 +238,7 @@ std::string ComplaintAboutSite(std::string_view site) {
 }
 
 std::string ComplaintAboutLandmark(std::string_view site) {
-  if (IsStandardSite(site) || IsFurtherSite(site)) {
+  if (IsSite(site)) {
     return "";
   }
   std::vector<std::string> codes = StandardSiteCodes();

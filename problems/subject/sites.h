@@ -43,6 +43,7 @@ std::string MirrorOf(std::string_view code);
 
 bool IsStandardSite(std::string_view site);
 bool IsFurtherSite(std::string_view site);
+bool IsSite(std::string_view name);  // standard or further
 
 // "go_l (Gonion)"; a code without side also works. The code alone if the site is in neither list.
 std::string SiteInWords(std::string_view site);

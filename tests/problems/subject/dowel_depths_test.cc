@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "problems/config/config.h"
+#include "problems/subject/dowel_placement.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 

@@ -200,13 +200,13 @@ TEST(MandibleOptions, CondylesAreAnAxisFromRightToLeft) {
               HasSubstr("at least 40 mm"));
   const auto options = ReadConfigText<MandibleOptions>(
       "{mesh: a.ply, condyle_left: [50, 76, -38], condyle_right: [-48, 75, -40]}", "a.yaml");
-  EXPECT_EQ(HingeOf(options, {}).left, kHinge.left);
+  EXPECT_EQ(FindHinge(options, {}).left, kHinge.left);
 }
 
 TEST(Hinge, UncheckedCondylesAreRefusedToo) {
   MandibleOptions options;
   options.condyle_left = options.condyle_right = {50, 76, -38};
-  EXPECT_THAT(WordsOf<InputError>([&] { HingeOf(options, {}); }),
+  EXPECT_THAT(WordsOf<InputError>([&] { FindHinge(options, {}); }),
               HasSubstr("subject.mandible.condyle_left: the condyles are 0.0 mm apart"));
 }
 
