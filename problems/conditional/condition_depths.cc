@@ -8,17 +8,34 @@
 #include <map>
 #include <set>
 
-#include "problems/conditional/site_correlation.h"
+#include "problems/subject/average_skull.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
 
+// Lays a point on the left side of the head.
+Vec3 Folded(const Vec3& p) { return {std::abs(p.x()), p.y(), p.z()}; }
+
+double CorrelationBetween(const SiteCorrelation& o, const std::string& a, const std::string& b) {
+  if (!IsSite(a) || !IsSite(b)) {
+    return 0;
+  }
+  if (!IsStandardSite(a) || !IsStandardSite(b)) {
+    return o.common + (WithoutSide(a) == WithoutSide(b) ? o.twins : 0);
+  }
+  const Vec3 p = AverageSite(a), q = AverageSite(b);
+  const double rest = 1 - o.common - o.twins - o.own;
+  return o.common + o.twins * std::exp(-(Folded(p) - Folded(q)).norm() / o.length_mm) +
+         rest * std::exp(-(p - q).norm() / o.length_mm);
+}
+
 using Notes = std::vector<std::string>;
 
-constexpr double kThinnest_mm = 0.5;
-constexpr double kFarthest_sds = 4;  // from the mean: beyond these no subject says how it goes on
+constexpr double kMinDepth_mm = 0.5;
+// Distance from the mean, in sds, beyond which a note warns: no subject of a table is so far out.
+constexpr double kMaxDistance_sds = 4;
 
 std::map<std::string, double> KnownCovariates(const TissueGiven& given) {
   std::map<std::string, double> known;
@@ -27,15 +44,15 @@ std::map<std::string, double> KnownCovariates(const TissueGiven& given) {
       known[name] = *value;
     }
   };
-  add("sex", given.sex ? std::optional(CovariateOf(*given.sex)) : std::nullopt);
-  add("build", given.build ? std::optional(CovariateOf(*given.build)) : std::nullopt);
+  add("sex", given.sex ? std::optional(CovariateValue(*given.sex)) : std::nullopt);
+  add("build", given.build ? std::optional(CovariateValue(*given.build)) : std::nullopt);
   add("age_years", given.age_years);
   add("bmi", given.bmi);
   return known;
 }
 
-// The tables' means in place of those of the table of spreads.
-void TakeMeans(const TissueOptions& options, JointNormal& joint) {
+// Replaces the means of the table of spreads by those of the tables in use.
+void ReplaceMeans(const TissueOptions& options, JointNormal& joint) {
   std::vector<TissueTable> tables;
   for (const std::filesystem::path& path : TablesOf(options)) {
     tables.push_back(ReadTissueTable(path));
@@ -58,69 +75,71 @@ std::vector<std::string> AllCodes() {
   return sites;
 }
 
-JointNormal JointOf(const TissueOptions& options) {
+JointNormal ReadDistribution(const TissueOptions& options) {
   const TissueGiven& given = options.given;
   const std::filesystem::path& path = given.spread.empty() ? options.table : given.spread;
   const TissueTable table = ReadTissueTable(path);
   JointNormal joint =
-      JointOfTable(table, options.sex, options.build, given.correlation, AllCodes());
+      MakeTableDistribution(table, options.sex, options.build, given.correlation, AllCodes());
   if (joint.names.empty()) {
     throw InputError(fmt::format(
-        "tissue.given: table '{}' states no standard deviation, so nothing tells how depths vary; "
-        "name one that does under given.spread, such as configs/tables/t_table_2023.yaml",
+        "tissue.given: table '{}' has no standard deviation, so the variation of depths is "
+        "unknown; "
+        "name a table that has some under given.spread, such as configs/tables/t_table_2023.yaml",
         table.id));
   }
   if (!given.spread.empty()) {
-    TakeMeans(options, joint);
+    ReplaceMeans(options, joint);
   }
   return joint;
 }
 
-// What is known and tells something. Covariates must; sites may be strange to the table.
-std::vector<KnownValue> Telling(const TissueGiven& given, const JointNormal& joint,
-                                const std::map<std::string, double>& depths, Notes& notes) {
+// The known values that the distribution can use. A known site may be unknown to the table, which
+// gives a note; an unknown covariate is an error.
+std::vector<KnownValue> UsableValues(const TissueGiven& given, const JointNormal& joint,
+                                     const std::map<std::string, double>& depths, Notes& notes) {
   std::vector<KnownValue> known;
-  std::vector<std::string> silent;
+  std::vector<std::string> unused;
   for (const auto& [site, depth_mm] : depths) {
-    joint.Find(site) ? known.push_back({site, depth_mm, given.error_mm}) : silent.push_back(site);
+    joint.Find(site) ? known.push_back({site, depth_mm, given.error_mm}) : unused.push_back(site);
   }
   for (const auto& [name, value] : KnownCovariates(given)) {
     if (!joint.Find(name)) {
       throw InputError(
           fmt::format("tissue.given.{}: the table has no such covariate among its correlations; "
-                      "leave it out, or "
-                      "name a table of a population that has it (semblance population)",
+                      "leave it out, or name a table of a population that has it (semblance "
+                      "population)",
                       name));
     }
     known.push_back({name, value});
   }
-  if (!silent.empty()) {
+  if (!unused.empty()) {
     notes.push_back(
-        fmt::format("tissue.given: the depth at {} tells nothing of the others, as the "
-                    "table does not say how it varies",
-                    fmt::join(silent, ", ")));
+        fmt::format("tissue.given: the depth at {} does not change the other depths, because the "
+                    "table has no standard deviation for it",
+                    fmt::join(unused, ", ")));
   }
   return known;
 }
 
-// What is known that no subject of the table comes near.
+// Notes known values that are far from those of all subjects of the table.
 void NoteFarValues(const JointNormal& joint, const std::vector<KnownValue>& known, Notes& notes) {
   for (const KnownValue& value : known) {
     const int at = *joint.Find(value.name);
     const double mean = joint.mean[at], sd = joint.sd[at];
     const double sds = std::abs(value.value - mean) / std::hypot(sd, value.error_sd);
-    if (sds > kFarthest_sds) {
+    if (sds > kMaxDistance_sds) {
       notes.push_back(fmt::format(
           "tissue.given: {} {:.4g} is {:.0f} standard deviations from the table's {:.4g} "
-          "± {:.2g}, so the depths given it are extrapolated; check the number",
+          "± {:.2g}, so the conditioned depths are extrapolated; check the number",
           value.name, value.value, sds, mean, sd));
     }
   }
 }
 
-// The depth of one dowel; false if the table does not say how it varies.
-bool Give(const TissueOptions& options, const JointNormal& joint, const ConditionalNormal& expected,
-          Dowel& dowel) {
+// Sets the depth of one dowel; returns false if the distribution does not include its site.
+bool SetExpectedDepth(const TissueOptions& options, const JointNormal& joint,
+                      const ConditionalNormal& expected, Dowel& dowel) {
   const std::optional<int> at = joint.Find(dowel.site);
   if (!at) {
     return false;
@@ -128,12 +147,12 @@ bool Give(const TissueOptions& options, const JointNormal& joint, const Conditio
   dowel.sd_mm = expected.sd[*at];
   dowel.depth_mm = expected.mean[*at];
   if (dowel.sd_mm > 0) {
-    dowel.depth_mm = std::max(dowel.depth_mm + options.sds * dowel.sd_mm, kThinnest_mm);
+    dowel.depth_mm = std::max(dowel.depth_mm + options.sds * dowel.sd_mm, kMinDepth_mm);
   }
   return true;
 }
 
-std::string InWords(const std::vector<KnownValue>& known) {
+std::string ListValues(const std::vector<KnownValue>& known) {
   std::vector<std::string> words;
   for (const KnownValue& value : known) {
     words.push_back(fmt::format("{} {:.4g}", value.name, value.value));
@@ -143,12 +162,25 @@ std::string InWords(const std::vector<KnownValue>& known) {
 
 }  // namespace
 
+Eigen::MatrixXd ModelledCorrelation(const SiteCorrelation& options,
+                                    std::span<const std::string> names) {
+  const auto size = static_cast<Eigen::Index>(names.size());
+  Eigen::MatrixXd correlation = Eigen::MatrixXd::Identity(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index j = 0; j < i; ++j) {
+      correlation(i, j) = correlation(j, i) = CorrelationBetween(options, names[i], names[j]);
+    }
+  }
+  return correlation;
+}
+
 bool IsConditioned(const TissueOptions& options) {
   return options.depths == DepthSource::kTable && !options.given.HasNothing();
 }
 
-JointNormal JointOfTable(const TissueTable& table, Sex sex, Build build,
-                         const SiteCorrelation& model, std::span<const std::string> sites) {
+JointNormal MakeTableDistribution(const TissueTable& table, Sex sex, Build build,
+                                  const SiteCorrelation& model,
+                                  std::span<const std::string> sites) {
   JointNormal joint;
   std::vector<double> mean, sd;
   const auto add = [&](const std::string& name, double m, double s, int n) {
@@ -188,27 +220,28 @@ std::vector<std::string> ConditionDepths(const TissueOptions& options,
   if (!IsConditioned(options)) {
     return notes;
   }
-  const JointNormal joint = JointOf(options);
+  const JointNormal joint = ReadDistribution(options);
   const std::map<std::string, double> depths = KnownDepths(options.given, landmarks);
-  const std::vector<KnownValue> known = Telling(options.given, joint, depths, notes);
+  const std::vector<KnownValue> known = UsableValues(options.given, joint, depths, notes);
   NoteFarValues(joint, known, notes);
   const ConditionalNormal expected = Condition(joint, known);
   std::vector<std::string> kept;
   for (Dowel& dowel : dowels) {
     const auto own = depths.find(dowel.site);
     if (!SetFor(options, dowel.site).empty()) {
-      continue;  // set by hand, and so no table's
+      continue;  // set by hand, not by a table
     }
-    if (!Give(options, joint, expected, dowel)) {
+    if (!SetExpectedDepth(options, joint, expected, dowel)) {
       own == depths.end() ? kept.push_back(dowel.site) : void(dowel.sd_mm = options.given.error_mm);
       dowel.depth_mm = own == depths.end() ? dowel.depth_mm : own->second;
     }
   }
-  notes.push_back(fmt::format("tissue depths are those to be expected given {}", InWords(known)));
+  notes.push_back(fmt::format("tissue depths are those expected given {}", ListValues(known)));
   if (!kept.empty()) {
-    notes.push_back(fmt::format(
-        "tissue.given: {} keep the table's depth, which does not say how it varies there",
-        fmt::join(kept, ", ")));
+    notes.push_back(
+        fmt::format("tissue.given: {} keep the table's depth, because the table has no standard "
+                    "deviation there",
+                    fmt::join(kept, ", ")));
   }
   return notes;
 }

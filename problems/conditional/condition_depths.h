@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A table's depths for one person of whom more is known: `tissue.given`.
+// Conditions a table's depths on the facts known about one person (`tissue.given`). A model of few
+// parameters replaces correlations that the table lacks.
 #pragma once
 
+#include <Eigen/Core>
 #include <span>
 #include <string>
 #include <vector>
@@ -13,28 +15,35 @@
 
 namespace semblance {
 
-// What a table says of people as one distribution, in a stratum: of the names of its correlations
-// or, where it has none, of those of `sites` that have an sd, by the model. Both sides of a pair
-// have the cell's mean and sd.
-JointNormal JointOfTable(const TissueTable& table, Sex sex, Build build,
-                         const SiteCorrelation& model, std::span<const std::string> sites);
+// The correlations of the model, with one row and one column per name: the formula of
+// SiteCorrelation with distances on the average skull. Sites that the average skull lacks correlate
+// by `common`, and with their twins by common + twins. Names that are no sites are uncorrelated.
+// `names` holds sites with their side, and other names, each once. The matrix is positive definite.
+Eigen::MatrixXd ModelledCorrelation(const SiteCorrelation& options,
+                                    std::span<const std::string> names);
 
-// After FillDepths: each dowel whose depth is a table's gets the mean and the standard deviation
-// that are to be expected given what options.given knows (joint_normal.h), plus options.sds of the
-// latter, at least 0.5 mm. One that is known itself gets its depth, exactly where error_mm is 0.
-// Does nothing where nothing is given: a table's own sd is then that of people about its mean, as
-// it states it, and not that of a forecast, which would be widened for the few subjects behind it.
+// The joint distribution over people that a table states for a stratum. Its numbers are the names
+// of the table's correlations. Without correlations they are those of `sites` that have an sd, and
+// the model gives the correlations. Both sides of a pair have the mean and sd of their cell.
+JointNormal MakeTableDistribution(const TissueTable& table, Sex sex, Build build,
+                                  const SiteCorrelation& model, std::span<const std::string> sites);
+
+// Conditions the depths that FillDepths took from a table on options.given. Each such dowel gets
+// the expected depth and its standard deviation (joint_normal.h), plus options.sds of the latter,
+// but at least 0.5 mm. A dowel whose own depth is known gets that depth, exactly if error_mm is 0.
+// Does nothing if options.given is empty. The sd of a table is then the spread of people about its
+// mean as published. It is not widened for the few subjects behind the table, as a prediction's is.
 //
-// Returns what people should know: what was given, what of it tells nothing or lies more than 4 sd
-// from the table's mean (of the sd and its error together), and the dowels that keep the table's
-// depth, as it says nothing of their spread. Throws InputError for a site that is unknown or
-// appears twice, a site in given.measured without a measured depth, a covariate that the table has
-// not, a table without any sd; IoError and ConfigError as ReadTissueTable.
+// Returns notes for people: the given facts, those that carry no information or lie more than 4 sd
+// from the table's mean (of sd and error together), and the dowels that keep the table's depth
+// because the table has no spread for them. Throws InputError for a site that is unknown or appears
+// twice, a site in given.measured without a measured depth, a covariate that the table lacks, and a
+// table without any sd. Throws IoError and ConfigError as ReadTissueTable.
 std::vector<std::string> ConditionDepths(const TissueOptions& options,
                                          const LandmarkFile& landmarks, std::span<Dowel> dowels);
 
-// The options with which a table's deviations are to be read: true where they are those of people
-// with what is known of this one, and no longer of people at large.
+// True if ConditionDepths changes depths, so that the deviations of dowels refer to people with the
+// facts known about this person, and not to all people.
 bool IsConditioned(const TissueOptions& options);
 
 }  // namespace semblance

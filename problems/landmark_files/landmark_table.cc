@@ -16,12 +16,12 @@
 namespace semblance {
 namespace {
 
-// Which column holds what.
+// Finds columns by name and remembers which were used.
 class Columns {
  public:
   explicit Columns(const CsvReader& table) : table_(table) {}
 
-  // The column that bears one of the names; nothing if there is none.
+  // The first column with one of the names; nothing if there is none.
   std::optional<std::size_t> Find(std::initializer_list<std::string_view> names) {
     for (std::size_t k = 0; k < table_.Columns().size(); ++k) {
       if (std::find(names.begin(), names.end(), LowerCase(table_.Columns()[k])) != names.end()) {
@@ -60,7 +60,7 @@ struct Layout {
   std::optional<std::size_t> depth_along_normal, depth_closest, certainty, note;
 };
 
-Layout LayoutOf(Columns& columns) {
+Layout FindLayout(Columns& columns) {
   return {.site = columns.Need({"site", "landmark", "label", "name"}),
           .x = columns.Need({"x", "x_mm"}),
           .y = columns.Need({"y", "y_mm"}),
@@ -86,7 +86,7 @@ std::vector<std::size_t> NumberColumns(const Layout& layout) {
 
 bool HasDecimalCommas(CsvReader table) {
   Columns columns(table);
-  const std::vector<std::size_t> numbers = NumberColumns(LayoutOf(columns));
+  const std::vector<std::size_t> numbers = NumberColumns(FindLayout(columns));
   const auto has_comma = [&](std::size_t k) {
     return table.Cell(k).find(',') != std::string::npos;
   };
@@ -98,7 +98,7 @@ bool HasDecimalCommas(CsvReader table) {
   return false;
 }
 
-CsvDialect DialectOf(std::string_view text, std::string_view file) {
+CsvDialect DetectDialect(std::string_view text, std::string_view file) {
   const std::string_view first = text.substr(0, text.find('\n'));
   if (first.find(';') == first.npos) {
     return {};
@@ -138,7 +138,7 @@ Certainty CertaintyAt(const CsvReader& table, std::optional<std::size_t> column)
   return static_cast<Certainty>(found - words.begin());
 }
 
-Landmark RowOf(const CsvReader& table, const Layout& layout) {
+Landmark ReadRow(const CsvReader& table, const Layout& layout) {
   return {.site = std::string(table.Cell(layout.site)),
           .point = {table.Number(layout.x), table.Number(layout.y), table.Number(layout.z)},
           .normal = NormalAt(table, layout),
@@ -152,13 +152,13 @@ Landmark RowOf(const CsvReader& table, const Layout& layout) {
 
 LandmarkFile ParseLandmarkTable(std::string_view text, std::string_view file,
                                 std::vector<std::string>& ignored) {
-  CsvReader table(text, file, DialectOf(text, file));
+  CsvReader table(text, file, DetectDialect(text, file));
   Columns columns(table);
-  const Layout layout = LayoutOf(columns);
+  const Layout layout = FindLayout(columns);
   ignored = columns.Unused();
   LandmarkFile result{.subject = "", .units = "mm", .axes = "", .landmarks = {}, .absent = {}};
   while (table.NextRow()) {
-    result.landmarks.push_back(RowOf(table, layout));
+    result.landmarks.push_back(ReadRow(table, layout));
   }
   return result;
 }

@@ -14,7 +14,7 @@ namespace {
 
 using json_parts::Json;
 
-std::string TextOf(const Json& json, const char* key, const char* otherwise) {
+std::string ReadText(const Json& json, const char* key, const char* otherwise) {
   const auto found = json.find(key);
   if (found == json.end()) {
     return otherwise;
@@ -25,11 +25,11 @@ std::string TextOf(const Json& json, const char* key, const char* otherwise) {
   return found->get<std::string>();
 }
 
-// Files before version 1.0 have numbers.
-std::string AxesOf(const Json& markup) {
+// Files before version 1.0 have numbers instead of names.
+std::string ReadAxes(const Json& markup) {
   const auto found = markup.find("coordinateSystem");
   if (found == markup.end()) {
-    throw IoError("there is no 'coordinateSystem'; it must say \"LPS\" or \"RAS\"");
+    throw IoError("'coordinateSystem' is missing; it must be \"LPS\" or \"RAS\"");
   }
   const std::string axes = found->is_string() ? found->get<std::string>() : found->dump();
   if (axes == "LPS" || axes == "1") {
@@ -42,7 +42,7 @@ std::string AxesOf(const Json& markup) {
 }
 
 void RequireMillimetres(const Json& markup) {
-  const std::string units = TextOf(markup, "coordinateUnits", "mm");
+  const std::string units = ReadText(markup, "coordinateUnits", "mm");
   if (units != "mm" && units.find("\"mm\"") == units.npos) {
     throw IoError(fmt::format("'coordinateUnits' is {}; export in mm", units));
   }
@@ -54,21 +54,21 @@ bool IsPosition(const Json& row) {
          json_parts::VecFromJson(row, 0).allFinite();
 }
 
-std::array<double, 3> PositionOf(const Json& point) {
+std::array<double, 3> ReadPosition(const Json& point) {
   const auto row = point.find("position");
   if (row == point.end() || !IsPosition(*row)) {
     throw IoError(fmt::format(
         "'position' is {}; it must be [x, y, z], finite numbers; place the point in Slicer, or "
         "mark it as missing there",
-        row == point.end() ? "not there" : row->dump()));
+        row == point.end() ? "missing" : row->dump()));
   }
   const Vec3 p = json_parts::VecFromJson(*row, 0);
   return {p.x(), p.y(), p.z()};
 }
 
-// Why a point has no place, by Slicer's four words; "" where it has one.
-std::string ReasonOfAbsence(const Json& point) {
-  const std::string status = TextOf(point, "positionStatus", "defined");
+// The reason why a point has no position, from Slicer's four states; empty if it has one.
+std::string AbsenceReason(const Json& point) {
+  const std::string status = ReadText(point, "positionStatus", "defined");
   if (status == "defined") {
     return "";
   }
@@ -90,18 +90,18 @@ void AddPoint(const Json& point, LandmarkFile& file) {
     throw IoError("'controlPoints' must list objects");
   }
   Landmark landmark;
-  landmark.site = TextOf(point, "label", "");
-  if (const std::string reason = ReasonOfAbsence(point); !reason.empty()) {
+  landmark.site = ReadText(point, "label", "");
+  if (const std::string reason = AbsenceReason(point); !reason.empty()) {
     file.absent.push_back({landmark.site, reason});
     return;
   }
-  landmark.point = PositionOf(point);
-  landmark.note = TextOf(point, "description", "");
+  landmark.point = ReadPosition(point);
+  landmark.note = ReadText(point, "description", "");
   file.landmarks.push_back(landmark);
 }
 
-// "point 3 'nasion'", from 1.
-std::string NameOf(const Json& point, std::size_t number) {
+// "point 3 'nasion'"; numbers begin with 1.
+std::string PointLabel(const Json& point, std::size_t number) {
   const bool has_label = point.is_object() && point.contains("label") && point["label"].is_string();
   return has_label ? fmt::format("point {} '{}'", number, point["label"].get<std::string>())
                    : fmt::format("point {}", number);
@@ -114,7 +114,7 @@ void AddPoints(const Json& markup, LandmarkFile& file) {
     try {
       AddPoint(point, file);
     } catch (const IoError& error) {
-      throw IoError(fmt::format("{}: {}", NameOf(point, number), error.what()));
+      throw IoError(fmt::format("{}: {}", PointLabel(point, number), error.what()));
     }
   }
 }
@@ -122,7 +122,7 @@ void AddPoints(const Json& markup, LandmarkFile& file) {
 LandmarkFile FromJson(const Json& json) {
   LandmarkFile file{.subject = "", .units = "mm", .axes = "", .landmarks = {}, .absent = {}};
   for (const Json& markup : json_parts::ListFromJson(json, "markups")) {
-    const std::string axes = AxesOf(markup);
+    const std::string axes = ReadAxes(markup);
     if (!file.axes.empty() && file.axes != axes) {
       throw IoError("its markups have different axes; export them one by one");
     }

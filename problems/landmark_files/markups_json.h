@@ -9,15 +9,15 @@
 
 namespace semblance {
 
-// The control points of all markups in the file, in order: names as `site`, descriptions as `note`,
-// coordinates as they stand; `axes` is LPS or RAS as the file says. A point that is not placed
-// (positionStatus undefined, missing or preview) becomes an absent one, whatever its position.
-// file: its name, for messages. Throws IoError for anything but such a file: no JSON, a key that is
-// repeated or lacks, units other than mm, markups with different axes; of a point, which is named:
-// another status, a position that is not three finite numbers.
+// Reads the control points of all markups in the file, in order. Names become `site`, descriptions
+// `note`; coordinates stay as they are. `axes` is LPS or RAS as the file states. A point that is
+// not placed (positionStatus undefined, missing or preview) becomes an absent site, whatever its
+// position. `file` is the file's name, for messages. Throws IoError for any other text: no JSON, a
+// repeated or missing key, units other than mm, or markups with different axes; and, with the
+// point's number and name, for another status or a position that is not three finite numbers.
 LandmarkFile ParseMarkupsJson(std::string_view text, std::string_view file);
 
-// One markup of points in LPS. Normals, depths and certainties have no place there.
+// Writes one markup of points in LPS. Normals, depths and certainties are lost.
 std::string MarkupsJson(const LandmarkFile& file);
 
 }  // namespace semblance

@@ -11,11 +11,9 @@
 
 #include "problems/config/config.h"
 #include "problems/config/utf8_check.h"
-#include "problems/landmark_files/fcsv.h"
 #include "problems/landmark_files/landmark_table.h"
 #include "problems/landmark_files/markups_json.h"
-#include "problems/landmark_files/picked_points.h"
-#include "problems/subject/site_names.h"
+#include "problems/landmark_files/point_files.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -31,20 +29,19 @@ LandmarkFile ParseTable(std::string_view text, std::string_view file, Notes& not
   std::vector<std::string> ignored;
   LandmarkFile result = ParseLandmarkTable(text, file, ignored);
   if (!ignored.empty()) {
-    notes.push_back(
-        fmt::format("{}: columns that mean nothing here: {}", file, fmt::join(ignored, ", ")));
+    notes.push_back(fmt::format("{}: ignored columns: {}", file, fmt::join(ignored, ", ")));
   }
   return result;
 }
 
-// A kind of file: how it is read and written.
+// A file format, with its parser and its writer.
 struct Format {
   std::string_view extension;
   LandmarkFile (*parse)(std::string_view text, std::string_view file, Notes& notes);
   std::string (*encode)(const LandmarkFile& file);
   bool holds_measurements;  // normals, depths and certainties
   bool holds_notes;
-  bool says_encoding = false;  // XML, whose parser turns any to UTF-8
+  bool states_encoding = false;  // XML, whose parser converts any encoding to UTF-8
 };
 
 std::string CloudComparePoints(const LandmarkFile& file) {
@@ -56,22 +53,22 @@ std::string CloudComparePoints(const LandmarkFile& file) {
 }
 
 template <LandmarkFile (*parse)(std::string_view, std::string_view)>
-LandmarkFile Plain(std::string_view text, std::string_view file, Notes&) {
+LandmarkFile WithoutNotes(std::string_view text, std::string_view file, Notes&) {
   return parse(text, file);
 }
 
 constexpr std::array kFormats = {
     Format{".yaml", nullptr, &WriteConfig<LandmarkFile>, true, true},
     Format{".yml", nullptr, &WriteConfig<LandmarkFile>, true, true},
-    Format{".mrk.json", &Plain<&ParseMarkupsJson>, &MarkupsJson, false, true},
-    Format{".fcsv", &Plain<&ParseFcsv>, &Fcsv, false, true},
-    Format{".pp", &Plain<&ParseMeshLabPoints>, &MeshLabPoints, false, false, true},
+    Format{".mrk.json", &WithoutNotes<&ParseMarkupsJson>, &MarkupsJson, false, true},
+    Format{".fcsv", &WithoutNotes<&ParseFcsv>, &Fcsv, false, true},
+    Format{".pp", &WithoutNotes<&ParseMeshLabPoints>, &MeshLabPoints, false, false, true},
     Format{".csv", &ParseTable, &LandmarkTable, true, true},
-    Format{".txt", &Plain<&ParsePointList>, &CloudComparePoints, false, false},
-    Format{".asc", &Plain<&ParsePointList>, &CloudComparePoints, false, false},
+    Format{".txt", &WithoutNotes<&ParsePointList>, &CloudComparePoints, false, false},
+    Format{".asc", &WithoutNotes<&ParsePointList>, &CloudComparePoints, false, false},
 };
 
-const Format& FormatOf(const fs::path& path) {
+const Format& FindFormat(const fs::path& path) {
   const std::string name = LowerCase(path.filename().string());
   for (const Format& format : kFormats) {
     if (name.ends_with(format.extension)) {
@@ -79,25 +76,25 @@ const Format& FormatOf(const fs::path& path) {
     }
   }
   throw InputError(fmt::format(
-      "{}: no kind of landmark file; known are .yaml, .mrk.json and .fcsv (3D Slicer), .pp "
+      "{}: unknown kind of landmark file; known are .yaml, .mrk.json and .fcsv (3D Slicer), .pp "
       "(MeshLab), .txt and .asc (CloudCompare), .csv",
       path.string()));
 }
 
-void Complain(const fs::path& path, const std::vector<std::string>& faults) {
+void ThrowFaults(const fs::path& path, const std::vector<std::string>& faults) {
   if (!faults.empty()) {
     throw InputError(fmt::format("{}: {}", path.string(),
                                  fmt::join(faults, fmt::format("\n{}: ", path.string()))));
   }
 }
 
-// Codes in place of names; points without one are left out where that is allowed.
+// Replaces names by codes of sites. Points without a known name are left out if that is allowed.
 template <class Entry>
 void NameSites(const ReadLandmarksOptions& options, std::vector<Entry>& entries, Notes& notes,
                std::vector<std::string>& faults) {
   std::vector<Entry> known;
   for (Entry& entry : entries) {
-    const NamedSite site = SiteCalled(entry.site);
+    const NamedSite site = FindSiteByName(entry.site);
     if (!site.code.empty()) {
       entry.site = site.code;
       known.push_back(entry);
@@ -121,28 +118,29 @@ void FindRepeats(const LandmarkFile& file, std::vector<std::string>& faults) {
   std::ranges::for_each(file.absent, see, &AbsentLandmark::site);
 }
 
-std::string_view WordOf(Axes axes) { return EnumNames(axes)[static_cast<std::size_t>(axes)]; }
+std::string_view AxesName(Axes axes) { return EnumNames(axes)[static_cast<std::size_t>(axes)]; }
 
-// Where the axes of a file of that kind can be set right.
+// The remedy for contradicting axes, which depends on whether the file can state others.
 std::string_view RemedyForAxes(const Format& format) {
   return format.parse != nullptr
              ? "leave the axes out"
-             : "leave the axes out, or correct `axes` in the file (LPS where it has none)";
+             : "leave the axes out, or correct `axes` in the file (LPS if it has none)";
 }
 
 void ChooseAxes(const fs::path& path, const ReadLandmarksOptions& options, LandmarkFile& file,
                 Notes& notes) {
   if (file.axes.empty() && !options.axes) {
-    notes.push_back(
-        fmt::format("{}: the file does not say its axes; taken as LPS", path.filename().string()));
+    notes.push_back(fmt::format("{}: the file does not state its axes; taken as LPS",
+                                path.filename().string()));
   }
-  const std::string said(options.axes ? WordOf(*options.axes) : "");
-  if (!file.axes.empty() && !said.empty() && file.axes != said) {
-    throw InputError(fmt::format("{}: the file says {}, and {} was asked for; {}", path.string(),
-                                 file.axes, said, RemedyForAxes(FormatOf(path))));
+  const std::string wanted(options.axes ? AxesName(*options.axes) : "");
+  if (!file.axes.empty() && !wanted.empty() && file.axes != wanted) {
+    throw InputError(fmt::format("{}: the file has {} axes, and {} was requested; {}",
+                                 path.string(), file.axes, wanted,
+                                 RemedyForAxes(FindFormat(path))));
   }
   if (file.axes.empty()) {
-    file.axes = said.empty() ? "LPS" : said;
+    file.axes = wanted.empty() ? "LPS" : wanted;
   }
 }
 
@@ -155,26 +153,25 @@ void TurnToLps(const fs::path& path, LandmarkFile& file, Notes& notes) {
       fmt::format("{}: turned from RAS to LPS (x and y negated)", path.filename().string()));
 }
 
-// Beyond, no weight of the placement is a number.
+// Refuses coordinates so large that the weights of the placement would no longer be numbers.
 void CheckReach(const fs::path& path, const LandmarkFile& file) {
-  constexpr double kFarthest_mm = 1e9;
+  constexpr double kMaxCoordinate_mm = 1e9;
   std::vector<std::string> faults;
   for (const Landmark& landmark : file.landmarks) {
     const auto& [x, y, z] = landmark.point;
     const double farthest_mm = std::max({std::abs(x), std::abs(y), std::abs(z)});
-    if (farthest_mm > kFarthest_mm) {
+    if (farthest_mm > kMaxCoordinate_mm) {
       faults.push_back(fmt::format("site {}: a coordinate of {:.3g} mm; at most 1e9 are allowed",
                                    landmark.site, farthest_mm));
     }
   }
-  Complain(path, faults);
+  ThrowFaults(path, faults);
 }
 
-// The bytes of a file, which must be UTF-8: its notes may go into YAML, which is read as nothing
-// else.
+// Reads a file that must be UTF-8, because its notes may be written to YAML, which is always UTF-8.
 std::string ReadText(const fs::path& path, const Format& format) {
   std::string text = ReadFileBytes(path);
-  const std::optional<int> line = format.says_encoding ? std::nullopt : LineThatIsNotUtf8(text);
+  const std::optional<int> line = format.states_encoding ? std::nullopt : LineThatIsNotUtf8(text);
   if (line) {
     throw IoError(fmt::format("{}:{}: a byte that is not UTF-8; save the file as UTF-8",
                               path.string(), *line));
@@ -196,7 +193,7 @@ LandmarkReading ReadForeign(const fs::path& path, const Format& format,
   if (file.landmarks.empty() && faults.empty()) {
     faults.emplace_back("there is no landmark; place at least one");
   }
-  Complain(path, faults);
+  ThrowFaults(path, faults);
   CheckLandmarks(file.landmarks, path.string());
   CheckReach(path, file);
   ChooseAxes(path, options, file, reading.notes);
@@ -207,7 +204,7 @@ LandmarkReading ReadForeign(const fs::path& path, const Format& format,
 }  // namespace
 
 LandmarkReading ReadLandmarks(const fs::path& path, const ReadLandmarksOptions& options) {
-  const Format& format = FormatOf(path);
+  const Format& format = FindFormat(path);
   if (format.parse != nullptr) {
     return ReadForeign(path, format, options);
   }
@@ -217,24 +214,24 @@ LandmarkReading ReadLandmarks(const fs::path& path, const ReadLandmarksOptions& 
   CheckReach(path, reading.file);
   if (reading.file.proposed) {
     reading.notes.push_back(fmt::format(
-        "{}: these landmarks are a proposal that no person has confirmed; look at each on the "
-        "skull, correct it, then set `proposed: false`",
+        "{}: these landmarks are a proposal that no person has confirmed; check each on the skull, "
+        "correct it, then set `proposed: false`",
         path.filename().string()));
   }
   return reading;
 }
 
 std::string EncodeLandmarks(const LandmarkFile& file, const fs::path& path) {
-  const Format& format = FormatOf(path);
+  const Format& format = FindFormat(path);
   return format.encode(format.parse == nullptr ? file : InLpsMm(file));
 }
 
 std::string AxesIn(const LandmarkFile& file, const fs::path& path) {
-  return FormatOf(path).parse == nullptr ? file.axes : "LPS";
+  return FindFormat(path).parse == nullptr ? file.axes : "LPS";
 }
 
 std::vector<std::string> LostIn(const LandmarkFile& file, const fs::path& path) {
-  const Format& format = FormatOf(path);
+  const Format& format = FindFormat(path);
   const auto count = [&](auto&& has) { return std::ranges::count_if(file.landmarks, has); };
   const auto measured = count([](const Landmark& l) {
     return l.normal || l.depth_along_normal_mm || l.depth_closest_mm ||
@@ -250,10 +247,10 @@ std::vector<std::string> LostIn(const LandmarkFile& file, const fs::path& path) 
   lose(format.holds_measurements, measured, "normals, depths and certainties");
   lose(format.holds_notes, noted, "notes");
   if (format.parse != nullptr && !file.absent.empty()) {
-    lost.push_back(fmt::format("{} sites that are said to be absent", file.absent.size()));
+    lost.push_back(fmt::format("{} sites that are listed as absent", file.absent.size()));
   }
   if (format.parse != nullptr && file.proposed) {
-    lost.emplace_back("that they are a proposal");
+    lost.emplace_back("the mark that they are a proposal");
   }
   if (AxesIn(file, path) != file.axes) {
     lost.push_back(fmt::format(

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Landmarks from whatever program placed them, and for it.
+// Reads and writes landmarks in the formats of all supported programs.
 #pragma once
 
 #include <filesystem>
@@ -12,33 +12,34 @@
 namespace semblance {
 
 struct ReadLandmarksOptions {
-  std::optional<Axes> axes;        // of a file that does not say; none: LPS, and a note
-  bool leave_out_unknown = false;  // points whose name is not a site, with a note each
+  std::optional<Axes> axes;  // axes of a file that does not state them; none: LPS, with a note
+  bool leave_out_unknown = false;  // skips points whose name is not a site, with a note each
 };
 
-// Landmarks in LPS and mm, and what people should know of how they were read.
+// Landmarks in LPS and mm, and notes for people on how they were read.
 struct LandmarkReading {
   LandmarkFile file;
   std::vector<std::string> notes;
 };
 
-// The format follows the extension: .yaml or .yml (ours), .mrk.json and .fcsv (3D Slicer), .pp
-// (MeshLab), .txt and .asc (CloudCompare), .csv. Sites may go by any name that SiteCalled knows.
-// RAS is turned to LPS, and a note says so. Throws IoError if the file cannot be read or is not of
-// its format; InputError with a line per fault if a name is no site (and may not be left out), a
-// site appears twice, there is no landmark, a coordinate is beyond all reach, or options.axes
-// contradicts the file; ConfigError as ReadLandmarkFileAsWritten does, for whatever kind of file.
+// Reads a landmark file. The extension decides the format: .yaml or .yml (ours), .mrk.json and
+// .fcsv (3D Slicer), .pp (MeshLab), .txt and .asc (CloudCompare), or .csv. A site may have any name
+// that FindSiteByName accepts. RAS is turned to LPS, with a note. Throws IoError if the file cannot
+// be read or does not have its format. Throws InputError with a line per fault if a name is no site
+// (unless it may be left out), a site appears twice, there is no landmark, a coordinate is above
+// 1e9 mm, or options.axes contradicts the file. Throws ConfigError as ReadLandmarkFileAsWritten,
+// for every format.
 LandmarkReading ReadLandmarks(const std::filesystem::path& path,
                               const ReadLandmarksOptions& options = {});
 
-// The bytes of a file of that kind; all but YAML are in mm and LPS, whatever `file` is in. Throws
-// InputError for an extension that is none of those above.
+// The bytes of a landmark file in the format of the path's extension. All formats but YAML are
+// written in mm and LPS. Throws InputError for an unknown extension.
 std::string EncodeLandmarks(const LandmarkFile& file, const std::filesystem::path& path);
 
-// The axes of those bytes: "LPS" or "RAS".
+// The axes in which EncodeLandmarks writes: "LPS" or "RAS".
 std::string AxesIn(const LandmarkFile& file, const std::filesystem::path& path);
 
-// What `file` holds that a file of that kind has no place for, a line each; empty if all goes in.
+// Lists, a line each, the contents of `file` that are lost in the format; empty if nothing is lost.
 std::vector<std::string> LostIn(const LandmarkFile& file, const std::filesystem::path& path);
 
 }  // namespace semblance

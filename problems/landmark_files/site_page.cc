@@ -8,7 +8,6 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/subject/site_names.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
@@ -17,7 +16,7 @@ namespace {
 
 struct Definition {
   std::string_view landmark;
-  std::string_view words;  // where it is on the bone
+  std::string_view words;  // its place on the bone
 };
 
 constexpr Definition kDefinitions[] = {
@@ -68,7 +67,7 @@ constexpr Definition kDefinitions[] = {
     {"mmb", "the lower border of the lower jaw, halfway between chin and angle"},
 };
 
-// "a" where the table has the row; "a (part)" where cells of it are missing.
+// The ids of the tables that have the site, as "a"; as "a (part)" if cells of the row are missing.
 std::vector<std::string> TablesWith(const Site& site, std::span<const TissueTable> tables) {
   std::vector<std::string> names;
   for (const TissueTable& table : tables) {
@@ -88,7 +87,7 @@ std::string Row(const Site& site, std::span<const TissueTable> tables) {
                      site.side == Side::kMidline ? fmt::format("`{}`", site.code)
                                                  : fmt::format("`{0}_l` `{0}_r`", site.landmark),
                      site.number == 0 ? "" : std::to_string(site.number), site.name,
-                     fmt::join(OtherNamesOf(site.landmark), ", "), SiteDefinition(site.landmark),
+                     fmt::join(OtherSiteNames(site.landmark), ", "), SiteDefinition(site.landmark),
                      fmt::join(TablesWith(site, tables), ", "));
 }
 

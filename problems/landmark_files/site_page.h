@@ -10,12 +10,13 @@
 
 namespace semblance {
 
-// The page, for the sites of sites.h in their order; picture: the file's name beside it. tables: in
-// whose order they are named; all of them are explained below. The same input, the same text.
+// Makes the page with the sites of sites.h in their order. `picture` is the name of the picture's
+// file in the same folder. The tables are named in the given order and explained below. The same
+// input gives the same text.
 std::string SitePage(std::span<const TissueTable> tables, const std::string& picture);
 
-// Where a site lies on the bone, in words. landmark: its code without side. Throws InputError for
-// one that is not in sites.h.
+// The place of a site on the bone, in words. `landmark` is its code without side. Throws InputError
+// for a landmark that is not in sites.h.
 std::string_view SiteDefinition(std::string_view landmark);
 
 }  // namespace semblance

@@ -30,7 +30,7 @@ void Disc(Image& image, double x, double y, double radius, const Colour& colour)
   }
 }
 
-// Where a disc lies, in pixels, and on which side of it its number stands.
+// The position of a disc in pixels, its number, and the side of the disc that shows the number.
 struct Numbered {
   double x = 0, y = 0;
   bool left = false;
@@ -59,7 +59,7 @@ Numbered MarkOf(const Site& site, const Vec3& point, const Camera& camera, View 
           .number = site.number};
 }
 
-// The sites that are seen; a number that would touch a former one stands on the other side.
+// The marks of the visible sites. A number that would touch a former one moves to the other side.
 std::vector<Numbered> MarksSeenFrom(View view, const Phantom& phantom, const Camera& camera) {
   std::vector<Numbered> marks;
   for (std::size_t k = 0; k < phantom.sites.size(); ++k) {
@@ -97,7 +97,8 @@ std::string ViewSvg(View view, const char* caption, int x, const Phantom& phanto
 
 constexpr int kSketchWidth = 220, kSketchHeight = 260;
 
-// Between two standard landmarks, of a pair those on its side: first + share * (second - first).
+// A place between two standard landmarks, for a pair those on its side:
+// first + share * (second - first).
 struct Between {
   std::string_view landmark, first, second;
   double share;
@@ -117,7 +118,7 @@ std::string OnSideOf(const Site& site, std::string_view landmark) {
              : fmt::format("{}_{}", landmark, site.side == Side::kLeft ? "l" : "r");
 }
 
-// Of the points near the midline the one that `far` puts highest.
+// The point near the midline with the largest value of `far`.
 template <class Far>
 Vec3 FarthestInMidline(const TriMesh& skull, const Far& far) {
   constexpr double kNear_mm = 3;
@@ -162,7 +163,8 @@ std::map<std::string, Vec3> PlacesOn(const Phantom& phantom, const MeshQuery& qu
   return places;
 }
 
-// CameraFor has no right side: the left one, turned half way round.
+// The camera from the right: the left one turned by 180 degrees, because CameraFor has no right
+// side.
 Camera FromItsRight(Camera camera) {
   camera.view_from_world.row(0) *= -1;
   camera.view_from_world.row(2) *= -1;
@@ -175,7 +177,7 @@ bool IsHidden(const MeshQuery& bone, const Camera& camera, const Vec3& place) {
   return bone.FirstHit(place + kAbove_mm * towards, towards, kFar_mm).has_value();
 }
 
-// A disc with a white rim; hollow where the bone hides the place.
+// Draws a disc with a white rim; hollow if bone hides the place.
 void Spot(Image& image, const SiteSketch::Seen& seen, const Vec3& place, double radius,
           std::uint32_t colour, bool hollow) {
   const Vec3 at = seen.camera.view_from_world * (place - seen.camera.centre);

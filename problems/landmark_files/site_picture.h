@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where the sites lie, on the skull of a phantom.
+// Pictures of the sites on the skull of a phantom.
 #pragma once
 
 #include <array>
@@ -16,22 +16,22 @@ namespace semblance {
 // the standard sites as dots and their numbers as text.
 std::string SitePictureSvg(int threads);
 
-// A skull and its sites, kept to draw a picture for each of them. The further sites are where their
-// definition puts them between others, for a phantom has none.
+// A skull and its sites, kept to draw a picture for each site. A phantom has no further sites; they
+// are placed between other sites, as their definitions state.
 struct SiteSketch {
   struct Seen {
     Camera camera;
     Image bone;
-    std::map<std::string, bool> hides;  // by site: the bone lies before it
+    std::map<std::string, bool> hides;  // by site: true if bone hides it
   };
   std::map<std::string, Vec3> places;  // of all standard and further sites, mm
-  std::array<Seen, 3> seen;            // from the front, from its left, from its right
+  std::array<Seen, 3> seen;            // from the front, from the left, from the right
 };
 SiteSketch MakeSiteSketch(int threads);
 
-// From the front and from the site's side (of one in the midline, the left): the site as a large
-// disc, a ring where the bone hides it; the standard ones of that side as small ones. 440 x 260
-// pixels. Throws InputError for a site that is in neither list.
+// The site seen from the front and from its side (a site in the midline: from the left), 440 x 260
+// pixels. The site is a large disc, or a ring if bone hides it; the standard sites of that side are
+// small discs. Throws InputError for a site that is in neither list.
 Image PictureOf(const SiteSketch& sketch, std::string_view site);
 
 }  // namespace semblance

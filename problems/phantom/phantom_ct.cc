@@ -15,7 +15,7 @@ namespace semblance {
 namespace {
 
 constexpr double kAirHu = -1000, kTissueHu = 40, kBoneHu = 1000, kPlasticHu = 100;
-constexpr int kLines = 3;  // across a voxel, each way
+constexpr int kLines = 3;  // lines through a voxel along y, and along z; more is finer and slower
 
 CtVolume EmptyVolume(const Box3& head, const PhantomCtOptions& options) {
   CtVolume volume;
@@ -30,7 +30,9 @@ CtVolume EmptyVolume(const Box3& head, const PhantomCtOptions& options) {
   return volume;
 }
 
-// Where the line through `start` along +x is inside a closed mesh: distances in and out by turns.
+// The distances at which the line from `start` along +x alternately enters and leaves a closed
+// mesh. A line that hits an edge may count it twice or miss it; then the line is moved a little and
+// retried.
 std::vector<double> Crossings(const MeshQuery& mesh, Vec3 start, double length_mm) {
   constexpr double kSameHit_mm = 1e-7, kNudge_mm = 1e-4;
   for (;;) {
@@ -43,12 +45,12 @@ std::vector<double> Crossings(const MeshQuery& mesh, Vec3 start, double length_m
     if (crossings.size() % 2 == 0) {
       return crossings;
     }
-    start += Vec3(0, kNudge_mm, 0.7 * kNudge_mm);  // along an edge: a little beside it
+    start += Vec3(0, kNudge_mm, 0.7 * kNudge_mm);
   }
 }
 
-// Adds `share` of each voxel's length between the crossings to a row of voxels. x_mm: of the row's
-// first voxel's near face, from where the crossings count.
+// Adds to each voxel of a row `share` times the fraction of its length that lies between crossings.
+// The near face of the first voxel is at x_mm, measured as the crossings are.
 void AddCoverage(const std::vector<double>& crossings, double x_mm, double pixel_mm, double share,
                  std::vector<double>& row) {
   for (std::size_t n = 0; n + 1 < crossings.size(); n += 2) {
@@ -60,7 +62,7 @@ void AddCoverage(const std::vector<double>& crossings, double x_mm, double pixel
   }
 }
 
-// The part of each voxel of a row that is inside a mesh, 0..1.
+// The fraction of each voxel of a row that is inside a mesh, 0..1.
 std::vector<double> RowCoverage(const MeshQuery& mesh, const CtVolume& volume, int row, int slice) {
   std::vector<double> coverage(volume.columns, 0);
   const double pixel_mm = volume.spacing_mm.x(), before_mm = pixel_mm;
@@ -77,7 +79,7 @@ std::vector<double> RowCoverage(const MeshQuery& mesh, const CtVolume& volume, i
   return coverage;
 }
 
-// The skull's inner side: its outer one drawn towards the centre.
+// The inner side of the skull: its outer side drawn towards the centre.
 TriMesh InnerTable(const Phantom& phantom, double bone_mm) {
   TriMesh inner = phantom.skull;
   for (Vec3& p : inner.points) {
@@ -103,9 +105,9 @@ LostBone::LostBone(const Phantom& phantom, const BoneDefect& defect) {
   }
   const auto site = std::ranges::find(phantom.sites, defect.site, &PhantomSite::site);
   if (site == phantom.sites.end()) {
-    throw InputError(
-        fmt::format("phantom: the head has no site '{}' to lose bone at; docs/sites.md lists them",
-                    defect.site));
+    throw InputError(fmt::format(
+        "phantom: the head has no site '{}' to lose bone at; docs/sites.md lists the sites",
+        defect.site));
   }
   centre_ = site->base;
   radius_mm_ = defect.radius_mm;

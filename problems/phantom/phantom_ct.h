@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A phantom as a CT scan of it would show it, to try the whole way from the scanner's files.
+// A CT scan of a phantom, to test the whole chain that begins with a scanner's files.
 #pragma once
 
 #include <string>
@@ -9,28 +9,29 @@
 
 namespace semblance {
 
-// Bone that is lost: a ball about the place of a site.
+// Lost bone: a ball around a site.
 struct BoneDefect {
   std::string site;  // empty: none
   double radius_mm = 22;
 };
 
 struct PhantomCtOptions {
-  double pixel_mm = 1;      // between columns and rows
-  double slice_mm = 1.5;    // between slices
-  double margin_mm = 12;    // of air about the head
-  double bone_mm = 7;       // about how thick the skull is
+  double pixel_mm = 1;      // distance of columns and of rows
+  double slice_mm = 1.5;    // distance of slices
+  double margin_mm = 12;    // air around the head
+  double bone_mm = 7;       // approximate thickness of the skull
   bool head_holder = true;  // a sheet of plastic behind the head
   BoneDefect defect = {};
   int threads = 1;
 };
 
-// Air -1000, tissue and brain 40, bone 1000, plastic 100 HU; each voxel the mean of what is in it
-// (exact along x, of 3 x 3 lines across). In the phantom's frame; the mesh must be closed. Throws
-// InputError for spacings that are not positive, and a defect at a site that the phantom lacks.
+// Air has -1000 HU, tissue and brain 40, bone 1000, plastic 100. A voxel has the mean over its
+// volume (exact along x, over 3 x 3 lines across it). The volume is in the phantom's frame. The
+// mesh must be closed. Throws InputError for a spacing that is not positive, and for a defect at a
+// site that the phantom lacks.
 CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options);
 
-// Where a phantom's bone is lost: the ball of a defect, its site looked up once.
+// The ball of a defect of a phantom's bone.
 class LostBone {
  public:
   // Throws InputError for a site that the phantom lacks.
@@ -39,7 +40,7 @@ class LostBone {
 
  private:
   Vec3 centre_ = Vec3::Zero();
-  double radius_mm_ = -1;  // holds nothing
+  double radius_mm_ = -1;  // an empty ball
 };
 
 }  // namespace semblance

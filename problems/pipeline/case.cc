@@ -8,12 +8,11 @@
 
 #include "problems/conditional/condition_depths.h"
 #include "problems/landmark_files/read_landmarks.h"
-#include "problems/phantom/phantom_landmarks.h"
 #include "problems/pipeline/extra_dowels.h"
 #include "problems/subject/landmark_mistakes.h"
-#include "problems/subject/network_file.h"
+#include "problems/subject/network_plan.h"
+#include "problems/subject/phantom.h"
 #include "problems/subject/sites.h"
-#include "problems/thinning/thinned_network.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

@@ -11,7 +11,7 @@
 #include "interp/dowels/dowel_network.h"
 #include "problems/metrics/face_details.h"
 #include "problems/pipeline/experiment.h"
-#include "problems/preparation/bone_origin.h"
+#include "problems/preparation/mirror.h"
 
 namespace semblance {
 

@@ -14,7 +14,7 @@
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/pipeline/step_clock.h"
-#include "problems/preparation/bone_origin.h"
+#include "problems/preparation/mirror.h"
 #include "surfaces/implicit_face.h"
 #include "surfaces/mesh/cut_planes.h"
 

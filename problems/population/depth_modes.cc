@@ -12,8 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMostRounds = 200;
-constexpr double kSettled_mm = 1e-6;
+constexpr int kMaxRounds = 200;
+constexpr double kTolerance_mm = 1e-6;  // change of filled depths at which the rounds end
 
 struct Components {
   VectorXd variances;  // descending
@@ -21,8 +21,8 @@ struct Components {
   MatrixXd modes;      // cells x modes, at one standard deviation
 };
 
-// Of centred rows, by the small matrix of subjects with subjects.
-Components ComponentsOf(const MatrixXd& rows, Index count) {
+// The components of centred rows, from the small matrix of subjects by subjects.
+Components FindComponents(const MatrixXd& rows, Index count) {
   const double freedom = static_cast<double>(rows.rows() - 1);
   const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(rows * rows.transpose() / freedom);
   Components found{VectorXd(count), MatrixXd(rows.rows(), count), MatrixXd(rows.cols(), count)};
@@ -39,8 +39,8 @@ Components ComponentsOf(const MatrixXd& rows, Index count) {
   return found;
 }
 
-// Depths of the used cells, subjects x cells; NaN where missing.
-MatrixXd DepthsOf(std::span<const DenseDepths> subjects, const std::vector<bool>& used) {
+// The depths of the used cells, subjects x cells; NaN if missing.
+MatrixXd UsedDepths(std::span<const DenseDepths> subjects, const std::vector<bool>& used) {
   MatrixXd depths(std::ssize(subjects), std::ranges::count(used, true));
   for (Index row = 0; row < depths.rows(); ++row) {
     Index column = 0;
@@ -53,7 +53,7 @@ MatrixXd DepthsOf(std::span<const DenseDepths> subjects, const std::vector<bool>
   return depths;
 }
 
-// Fills what is missing from the components, and finds these anew, until nothing moves.
+// Alternately finds the components and fills missing depths from them, until the depths rest.
 Components FillAndFind(const MatrixXd& depths, const VectorXd& start, Index count) {
   MatrixXd full = depths;
   for (Index row = 0; row < full.rows(); ++row) {
@@ -62,9 +62,9 @@ Components FillAndFind(const MatrixXd& depths, const VectorXd& start, Index coun
     }
   }
   Components found;
-  for (int round = 0; round < kMostRounds; ++round) {
+  for (int round = 0; round < kMaxRounds; ++round) {
     const Eigen::RowVectorXd mean = full.colwise().mean();
-    found = ComponentsOf(full.rowwise() - mean, count);
+    found = FindComponents(full.rowwise() - mean, count);
     double moved = 0;
     const MatrixXd predicted = (found.scores * found.modes.transpose()).rowwise() + mean;
     for (Index row = 0; row < full.rows(); ++row) {
@@ -75,7 +75,7 @@ Components FillAndFind(const MatrixXd& depths, const VectorXd& start, Index coun
         }
       }
     }
-    if (moved < kSettled_mm) {
+    if (moved < kTolerance_mm) {
       break;
     }
   }
@@ -84,7 +84,7 @@ Components FillAndFind(const MatrixXd& depths, const VectorXd& start, Index coun
   return found;
 }
 
-// Mean, deviation and place of one cell.
+// Computes mean, deviation and position of one cell.
 void Summarise(std::span<const DenseDepths> subjects, std::size_t cell, DepthModes& result) {
   double sum = 0, squares = 0;
   Vec3 place = Vec3::Zero();
@@ -106,7 +106,7 @@ void Summarise(std::span<const DenseDepths> subjects, std::size_t cell, DepthMod
   result.sd_mm[cell] = n > 1 ? std::sqrt(squares / (n - 1)) : kNaN;
 }
 
-void PutModes(const Components& found, DepthModes& result) {
+void StoreModes(const Components& found, DepthModes& result) {
   result.scores = found.scores;
   for (Index k = 0; k < found.modes.cols(); ++k) {
     result.share.push_back(found.variances[k]);
@@ -137,7 +137,7 @@ DepthModes FindModes(std::span<const DenseDepths> subjects, const DenseOptions& 
     Summarise(subjects, cell, result);
     result.used[cell] = result.n[cell] >= least;
   }
-  const MatrixXd depths = DepthsOf(subjects, result.used);
+  const MatrixXd depths = UsedDepths(subjects, result.used);
   const Index count = std::min<Index>({options.modes, std::ssize(subjects) - 1, depths.cols()});
   if (count < 1) {
     return result;
@@ -149,8 +149,42 @@ DepthModes FindModes(std::span<const DenseDepths> subjects, const DenseOptions& 
       means[column++] = result.mean_mm[cell];
     }
   }
-  PutModes(FillAndFind(depths, means, count), result);
+  StoreModes(FillAndFind(depths, means, count), result);
   return result;
+}
+
+DenseMesh MakeDenseMesh(const DepthModes& dense) {
+  DenseMesh mesh;
+  std::vector<std::int32_t> vertex(dense.n.size(), -1);
+  for (std::size_t cell = 0; cell < vertex.size(); ++cell) {
+    if (dense.n[cell] > 0) {
+      vertex[cell] = static_cast<std::int32_t>(mesh.cells.size());
+      mesh.cells.push_back(cell);
+      mesh.mesh.points.push_back(dense.bone[cell]);
+    }
+  }
+  const auto add = [&](std::size_t a, std::size_t b, std::size_t c) {
+    if (vertex[a] >= 0 && vertex[b] >= 0 && vertex[c] >= 0) {
+      mesh.mesh.triangles.push_back({vertex[a], vertex[b], vertex[c]});
+    }
+  };
+  for (int j = 0; j + 1 < dense.rows; ++j) {
+    for (int i = 0; i + 1 < dense.columns; ++i) {
+      const std::size_t a = i + static_cast<std::size_t>(dense.columns) * j, b = a + 1,
+                        c = a + dense.columns, d = c + 1;
+      add(a, b, d);
+      add(a, d, c);
+    }
+  }
+  return mesh;
+}
+
+std::vector<double> OnVertices(const DenseMesh& mesh, const std::vector<double>& by_cell) {
+  std::vector<double> values;
+  for (const std::size_t cell : mesh.cells) {
+    values.push_back(by_cell[cell]);
+  }
+  return values;
 }
 
 }  // namespace semblance

@@ -33,9 +33,11 @@ JointSample Without(const JointSample& sample, Index subject) {
   return rest;
 }
 
-// What the subject's row knows, of the covariates or of the depths at the known sites.
-std::vector<KnownValue> KnownOf(const PopulationFile& file, const JointSample& sample,
-                                Index subject, const JointNormal& joint, bool person, bool depths) {
+// The known values of the subject's row: covariates if `person`, depths at the known sites if
+// `depths`.
+std::vector<KnownValue> KnownValues(const PopulationFile& file, const JointSample& sample,
+                                    Index subject, const JointNormal& joint, bool person,
+                                    bool depths) {
   std::vector<KnownValue> known;
   for (Index j = 0; j < std::ssize(sample.names); ++j) {
     const std::string& name = sample.names[j];
@@ -47,7 +49,7 @@ std::vector<KnownValue> KnownOf(const PopulationFile& file, const JointSample& s
   return known;
 }
 
-Forecasts ForecastsOf(const JointNormal& joint, const std::vector<KnownValue>& known) {
+Forecasts Predict(const JointNormal& joint, const std::vector<KnownValue>& known) {
   const ConditionalNormal expected = Condition(joint, known);
   Forecasts forecasts;
   for (std::size_t k = 0; k < joint.names.size(); ++k) {
@@ -59,8 +61,8 @@ Forecasts ForecastsOf(const JointNormal& joint, const std::vector<KnownValue>& k
   return forecasts;
 }
 
-Forecasts ForecastsOf(const TissueTable& table, const PopulationSubject& person,
-                      const JointSample& sample) {
+Forecasts Predict(const TissueTable& table, const PopulationSubject& person,
+                  const JointSample& sample) {
   Forecasts forecasts;
   for (const std::string& name : sample.names) {
     const auto depth = FindDepth(table, person.sex.value_or(Sex::kMale),
@@ -72,8 +74,8 @@ Forecasts ForecastsOf(const TissueTable& table, const PopulationSubject& person,
   return forecasts;
 }
 
-// Whether the table has columns of sex and build, and the person's are not all known.
-bool IsAssumed(const TissueTable& table, const PopulationSubject& person) {
+// True if the table has columns of sex and build, and one of them is not known of the person.
+bool NeedsAssumption(const TissueTable& table, const PopulationSubject& person) {
   const bool is_pooled =
       !table.rows.empty() && table.rows.front().values.contains("adult");  // tissue_table.h
   return !is_pooled && !(person.sex && person.build);
@@ -84,8 +86,8 @@ struct NamedTable {
   TissueTable table;
 };
 
-// The id, with a number behind it where another way has it.
-std::string NameFor(const std::string& id, const std::vector<NamedTable>& before) {
+// The id, followed by a number if it is already the name of another method.
+std::string UniqueName(const std::string& id, const std::vector<NamedTable>& before) {
   constexpr std::array kOwn = {"mean", "person", "known", "person_known"};
   std::string name = id;
   for (int number = 2; std::ranges::find(kOwn, name) != kOwn.end() ||
@@ -96,30 +98,31 @@ std::string NameFor(const std::string& id, const std::vector<NamedTable>& before
   return name;
 }
 
-class Judge {
+class Predictor {
  public:
-  Judge(const PopulationFile& file, const std::vector<CountedSubject>& subjects,
-        const JointSample& sample)
+  Predictor(const PopulationFile& file, const std::vector<CountedSubject>& subjects,
+            const JointSample& sample)
       : file_(file), subjects_(subjects), sample_(sample) {
     for (const std::filesystem::path& path : file.tables) {
       TissueTable table = ReadTissueTable(path);
-      const std::string name = NameFor(table.id, tables_);
+      const std::string name = UniqueName(table.id, tables_);
       tables_.push_back({name, std::move(table)});
     }
-    for (const std::string& name : Varying(sample).names) {  // else it would be the mean again
+    // A method without a number that varies would repeat the mean.
+    for (const std::string& name : Varying(sample).names) {
       has_person_ = has_person_ || !IsSite(name);
       has_known_ = has_known_ || (IsSite(name) && IsKnownSite(file, name));
     }
   }
 
-  // By name, the ways in their order.
-  std::vector<std::pair<std::string, Forecasts>> Of(Index subject) const {
+  // The forecasts of all methods, by name, for one subject from the others.
+  std::vector<std::pair<std::string, Forecasts>> PredictSubject(Index subject) const {
     const JointNormal joint =
         FitPopulation(Without(sample_, subject), file_.correlation, file_.shrinkage);
     std::vector<std::pair<std::string, Forecasts>> ways;
     const auto add = [&](const char* name, bool person, bool depths) {
       ways.emplace_back(
-          name, ForecastsOf(joint, KnownOf(file_, sample_, subject, joint, person, depths)));
+          name, Predict(joint, KnownValues(file_, sample_, subject, joint, person, depths)));
     };
     add("mean", false, false);
     if (has_person_) {
@@ -132,22 +135,22 @@ class Judge {
       add("person_known", true, true);
     }
     for (const auto& [name, table] : tables_) {
-      ways.emplace_back(name, ForecastsOf(table, subjects_[subject].person, sample_));
+      ways.emplace_back(name, Predict(table, subjects_[subject].person, sample_));
     }
     return ways;
   }
 
-  // Of a way that is a table: the subjects whose sex or build it has to assume.
+  // The number of subjects whose sex or build the method has to assume, if it is a table.
   int CountAssumed(const std::string& way) const {
     const auto at = std::ranges::find(tables_, way, &NamedTable::name);
     return at == tables_.end()
                ? 0
                : static_cast<int>(std::ranges::count_if(subjects_, [&](const auto& subject) {
-                   return IsAssumed(at->table, subject.person);
+                   return NeedsAssumption(at->table, subject.person);
                  }));
   }
 
-  // Whether all ways predict the site and the subject has it.
+  // True if all methods predict the site and the subject has a depth there.
   bool Counts(Index subject, Index column,
               const std::vector<std::pair<std::string, Forecasts>>& ways) const {
     const std::string& site = sample_.names[column];
@@ -196,17 +199,17 @@ void CompareWithMean(std::vector<Foresight>& ways) {
 std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
                                    const std::vector<CountedSubject>& subjects,
                                    const JointSample& sample) {
-  constexpr Index kFewest = 3;
+  constexpr Index kMinSubjects = 3;
   std::vector<Foresight> result;
-  if (sample.values.rows() < kFewest) {
+  if (sample.values.rows() < kMinSubjects) {
     return result;
   }
-  const Judge judge(file, subjects, sample);
+  const Predictor predictor(file, subjects, sample);
   for (Index subject = 0; subject < sample.values.rows(); ++subject) {
-    const auto ways = judge.Of(subject);
+    const auto ways = predictor.PredictSubject(subject);
     result.resize(ways.size());
     for (Index j = 0; j < sample.values.cols(); ++j) {
-      if (!judge.Counts(subject, j, ways)) {
+      if (!predictor.Counts(subject, j, ways)) {
         continue;
       }
       for (std::size_t w = 0; w < ways.size(); ++w) {
@@ -220,7 +223,7 @@ std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
     }
   }
   for (Foresight& way : result) {
-    way.assumed = judge.CountAssumed(way.name);
+    way.assumed = predictor.CountAssumed(way.name);
     Score(static_cast<int>(sample.values.rows()), way);
   }
   CompareWithMean(result);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How well a population's table, and what it says given something of a person, predicts a person
-// who is not in it.
+// Measures by cross-validation how well a population's table predicts a person who is not in it,
+// with and without facts known about the person.
 #pragma once
 
 #include <string>
@@ -19,25 +19,26 @@ struct PredictedDepth {
   double depth_mm = kNaN, predicted_mm = kNaN, sd_mm = kNaN;
 };
 
-// One way of predicting.
+// The predictions of one method for the sites of all subjects.
 struct Foresight {
-  std::string name;  // mean; person: given sex, build, age and body mass index as far as they are
-                     // known; known: given the depths at PopulationFile::known; person_known: given
-                     // both; else the id of a published table, with a number if it is taken
+  // The method. "mean": mean of the others; "person": given sex, build, age and body mass index as
+  // far as they are known; "known": given the depths at PopulationFile::known; "person_known":
+  // given both; otherwise the id of a published table, with a number if the name is taken.
+  std::string name;
   std::vector<PredictedDepth> depths;
-  DepthScores scores;             // over all of them
-  std::vector<double> mae_mm;     // one per subject; NaN without a depth
-  SampleSummary against_mean_mm;  // per subject: its mae less that of `mean`
-  int assumed = 0;  // of a table: subjects whose sex or build it asks for and is not known
+  DepthScores scores;             // over all depths
+  std::vector<double> mae_mm;     // mean absolute error, one per subject; NaN without a depth
+  SampleSummary against_mean_mm;  // over subjects: mae less that of "mean"
+  int assumed = 0;  // for a table: subjects whose sex or build it needs and is not known
 };
 
-// Each subject in turn: the distribution is found again from the others alone, and the subject's
-// depths are compared with it. Compared are the sites that all ways predict, but for those at
-// `known` and their other sides. Tables are taken for sex and build as far as they are known, else
-// male and normal. Subjects without one of the known depths are predicted by those that they have.
-// `person` and `person_known` are left out where no two subjects are known to differ in anything,
-// `known` and `person_known` where none of its sites varies.
-// Empty with fewer than three subjects.
+// Leaves out each subject in turn, estimates the distribution from the others, and compares the
+// subject's depths with the predictions. Compares the sites that all methods predict, except those
+// at `known` and their mirror sites. A table is read for the subject's sex and build; an unknown
+// sex counts as male and an unknown build as normal. A subject that lacks one of the known depths
+// is predicted from those that it has. The methods `person` and `person_known` are left out if no
+// two subjects are known to differ in a covariate, `known` and `person_known` if no known site
+// varies. The result is empty with fewer than three subjects.
 std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
                                    const std::vector<CountedSubject>& subjects,
                                    const JointSample& sample);

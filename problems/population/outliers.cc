@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "problems/subject/sites.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance {
@@ -14,10 +15,11 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr double kNormalFactor = 1.4826;  // of the median absolute deviation
+// The sd of a normal distribution divided by its median absolute deviation.
+constexpr double kNormalFactor = 1.4826;
 
-// (value - median) / robust deviation of the finite ones; NaN elsewhere, and for too few.
-std::vector<double> RobustZ(const std::vector<double>& values, double least_deviation) {
+// (value - median) / robust deviation of the finite values; NaN elsewhere, and for too few values.
+std::vector<double> RobustZ(const std::vector<double>& values, double min_deviation) {
   std::vector<double> there, off;
   for (const double value : values) {
     if (std::isfinite(value)) {
@@ -32,15 +34,15 @@ std::vector<double> RobustZ(const std::vector<double>& values, double least_devi
   for (const double value : there) {
     off.push_back(std::abs(value - median));
   }
-  const double deviation = std::max(kNormalFactor * Quantile(off, 0.5), least_deviation);
+  const double deviation = std::max(kNormalFactor * Quantile(off, 0.5), min_deviation);
   for (std::size_t k = 0; k < values.size(); ++k) {
     z[k] = (values[k] - median) / deviation;
   }
   return z;
 }
 
-// Columns of the sample as the joint distribution has them.
-std::vector<Index> ColumnsOf(const JointSample& sample, const JointNormal& joint) {
+// The columns of the sample in the order of the joint distribution.
+std::vector<Index> FindColumns(const JointSample& sample, const JointNormal& joint) {
   std::vector<Index> columns;
   for (const std::string& name : joint.names) {
     columns.push_back(std::ranges::find(sample.names, name) - sample.names.begin());
@@ -48,11 +50,12 @@ std::vector<Index> ColumnsOf(const JointSample& sample, const JointNormal& joint
   return columns;
 }
 
-// Each number less what the others of its subject let expect, subjects x names of the joint; with P
-// the inverse covariance of those that the subject has, P (x - m) over P's diagonal.
-MatrixXd Surprises(const MatrixXd& values, const JointNormal& joint) {
+// Each number minus its expectation given the other numbers of its subject, subjects x names of the
+// joint. With P the inverse covariance of the numbers that the subject has, this is P (x - m)
+// divided by P's diagonal.
+MatrixXd Residuals(const MatrixXd& values, const JointNormal& joint) {
   const MatrixXd s = joint.sd.asDiagonal() * joint.correlation * joint.sd.asDiagonal();
-  MatrixXd surprises = MatrixXd::Constant(values.rows(), values.cols(), kNaN);
+  MatrixXd residuals = MatrixXd::Constant(values.rows(), values.cols(), kNaN);
   for (Index row = 0; row < values.rows(); ++row) {
     std::vector<Index> at;
     for (Index j = 0; j < values.cols(); ++j) {
@@ -66,19 +69,19 @@ MatrixXd Surprises(const MatrixXd& values, const JointNormal& joint) {
     const MatrixXd precision =
         s(at, at).llt().solve(MatrixXd::Identity(std::ssize(at), std::ssize(at)));
     const VectorXd off = values.row(row)(at).transpose() - joint.mean(at);
-    const VectorXd alone = (precision * off).cwiseQuotient(precision.diagonal());
+    const VectorXd residual = (precision * off).cwiseQuotient(precision.diagonal());
     for (std::size_t k = 0; k < at.size(); ++k) {
-      surprises(row, at[k]) = alone[static_cast<Index>(k)];
+      residuals(row, at[k]) = residual[static_cast<Index>(k)];
     }
   }
-  return surprises;
+  return residuals;
 }
 
 std::vector<double> Column(const MatrixXd& matrix, Index j) {
   return {matrix.col(j).begin(), matrix.col(j).end()};
 }
 
-// Per subject, over its sites; NaN without any.
+// The logarithm of the root mean square of each row's finite values; NaN without any.
 std::vector<double> LogRms(const MatrixXd& z) {
   std::vector<double> logs;
   for (const auto row : z.rowwise()) {
@@ -97,30 +100,30 @@ std::vector<double> LogRms(const MatrixXd& z) {
 
 std::vector<Outlier> FindOutliers(const JointSample& sample, const JointNormal& joint,
                                   const OutlierOptions& options) {
-  constexpr double kLeast_mm = 0.2, kLeastLog = 0.1;
-  const MatrixXd values = sample.values(Eigen::all, ColumnsOf(sample, joint));
-  const MatrixXd surprises = Surprises(values, joint);
-  MatrixXd unlike = MatrixXd::Constant(values.rows(), values.cols(), kNaN);
+  constexpr double kMinDeviation_mm = 0.2, kMinLogDeviation = 0.1;
+  const MatrixXd values = sample.values(Eigen::all, FindColumns(sample, joint));
+  const MatrixXd residuals = Residuals(values, joint);
+  MatrixXd scaled = MatrixXd::Constant(values.rows(), values.cols(), kNaN);
   std::vector<Outlier> outliers;
   for (Index j = 0; j < values.cols(); ++j) {
     if (!IsSite(joint.names[j])) {
       continue;
     }
-    const std::vector<double> z = RobustZ(Column(surprises, j), kLeast_mm);
-    const std::vector<double> off = RobustZ(Column(values, j), kLeast_mm);
+    const std::vector<double> z = RobustZ(Column(residuals, j), kMinDeviation_mm);
+    const std::vector<double> off = RobustZ(Column(values, j), kMinDeviation_mm);
     for (Index row = 0; row < values.rows(); ++row) {
-      unlike(row, j) = off[row];
+      scaled(row, j) = off[row];
       if (std::abs(z[row]) > options.site_z) {
         outliers.push_back({.subject = static_cast<int>(row),
                             .site = joint.names[j],
                             .depth_mm = values(row, j),
-                            .expected_mm = values(row, j) - surprises(row, j),
+                            .expected_mm = values(row, j) - residuals(row, j),
                             .z = z[row]});
       }
     }
   }
   std::ranges::stable_sort(outliers, {}, &Outlier::subject);
-  const std::vector<double> whole = RobustZ(LogRms(unlike), kLeastLog);
+  const std::vector<double> whole = RobustZ(LogRms(scaled), kMinLogDeviation);
   for (std::size_t row = 0; row < whole.size(); ++row) {
     if (whole[row] > options.subject_z) {
       outliers.push_back({.subject = static_cast<int>(row), .site = {}, .z = whole[row]});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Depths, and subjects, that do not look like the others of their population.
+// Finds depths and subjects that do not fit the others of their population.
 #pragma once
 
 #include <string>
@@ -10,27 +10,30 @@
 
 namespace semblance {
 
-// Subjects with a depth at a site for outliers to be looked for there: a median of fewer says
-// nothing.
+// The number of subjects with a depth at a site from which outliers are searched there. The median
+// absolute deviation of fewer subjects is not reliable.
 inline constexpr int kFewestForOutliers = 8;
 
 struct Outlier {
   int subject = -1;           // row of the sample
   std::string site;           // empty: the subject as a whole
-  double depth_mm = kNaN;     // of a site
-  double expected_mm = kNaN;  // by the subject's other depths
-  double z = kNaN;            // robust deviations
+  double depth_mm = kNaN;     // depth of the site
+  double expected_mm = kNaN;  // expected from the subject's other depths
+  double z = kNaN;            // distance in robust deviations
 };
 
-// A depth: with e its distance from what the subject's other numbers let expect (of the joint
-// distribution; covariates count too), z = (e - median) / s over the subjects that have the site, s
-// 1.4826 times the median absolute deviation and at least 0.2 mm. A subject: likewise the logarithm
-// of the root mean square over its sites of (depth - median) / s, s at least 0.1. Nothing where
-// fewer than kFewestForOutliers subjects have a site. Sites first, in the order of the subjects.
+// Finds outliers by a robust z = (e - median) / s over the subjects, where s is 1.4826 times the
+// median absolute deviation.
+//   A depth: e is the depth minus its expectation given the subject's other numbers, including
+//   covariates, in the joint distribution. s is at least 0.2 mm.
+//   A subject: e is the logarithm of the root mean square, over its sites, of (depth - median) / s.
+//   Here s is at least 0.1.
+// Sites that fewer than kFewestForOutliers subjects have are skipped. Depths come first in the
+// result, in the order of the subjects.
 std::vector<Outlier> FindOutliers(const JointSample& sample, const JointNormal& joint,
                                   const OutlierOptions& options);
 
-// The sample with the depths of outlying sites, and all of outlying subjects, NaN.
+// Sets the depths of outlying sites, and all numbers of outlying subjects, to NaN.
 JointSample WithoutOutliers(JointSample sample, const std::vector<Outlier>& outliers);
 
 }  // namespace semblance

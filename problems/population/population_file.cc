@@ -4,14 +4,20 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <iterator>
 #include <set>
 
 #include "problems/config/config.h"
+#include "problems/config/spelling_suggestion.h"
 #include "problems/output/file_hashes.h"
-#include "problems/population/population_folder.h"
+#include "problems/output/manifest.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/csv.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
 
 namespace semblance {
 namespace {
@@ -25,17 +31,18 @@ bool IsMissing(const PopulationSubject& subject) {
   return std::ranges::any_of(files, [](const NamedFile& named) { return !fs::exists(named.file); });
 }
 
-std::vector<fs::path> FilesBehind(const fs::path& path) {
+// The files of a path; a folder stands for the files of its volume.
+std::vector<fs::path> ListFiles(const fs::path& path) {
   return fs::is_directory(path) ? VolumeFiles(path) : std::vector{path};
 }
 
-// The options as text, each file by its content and not by where it lies.
+// The options as text, in which the hash of a file's content replaces its path.
 template <class Options>
 std::string Fingerprint(const Options& options, FileHashes& hashes) {
   std::string text = ToFlowYaml(ConfigTreeOf(options));
   for (const NamedFile& named : NamedFiles(options)) {
     std::string content;
-    for (const fs::path& part : FilesBehind(named.file)) {
+    for (const fs::path& part : ListFiles(named.file)) {
       content += hashes.Of(part);
     }
     const std::string name = named.file.string();
@@ -46,7 +53,7 @@ std::string Fingerprint(const Options& options, FileHashes& hashes) {
   return text;
 }
 
-// The same whatever the population says of the person, who is not measured anew for it.
+// Removes the fields that do not affect the measurement, so that a change of them keeps the id.
 PopulationSubject WithoutPerson(PopulationSubject subject) {
   subject.optional = false;
   subject.sex.reset();
@@ -78,12 +85,13 @@ void CheckNames(const std::vector<PopulationEntry>& entries) {
   }
 }
 
-// Subjects that can serve those without landmarks.
+// Chooses subjects with landmarks as references for subjects without.
 void FindReferences(const std::vector<PopulationSubject>& subjects, PopulationFile& file) {
-  constexpr std::size_t kMost = 3;
+  constexpr std::size_t kMaxReferences = 3;  // each costs a warp per subject without landmarks
   for (const PopulationSubject& subject : subjects) {
     const auto* files = std::get_if<FileSubject>(&subject.subject);
-    if (files != nullptr && !files->landmarks.empty() && file.measure.references.size() < kMost) {
+    if (files != nullptr && !files->landmarks.empty() &&
+        file.measure.references.size() < kMaxReferences) {
       file.measure.references.push_back({files->skull, files->landmarks});
     }
   }
@@ -97,9 +105,221 @@ bool HasLandmarks(const PopulationSubject& subject) {
   return ct == nullptr || !ct->landmarks.empty();
 }
 
+namespace fs = std::filesystem;
+
+std::vector<fs::path> Sorted(const fs::path& folder) {
+  std::vector<fs::path> entries;
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    entries.push_back(entry.path());
+  }
+  std::ranges::sort(entries);
+  return entries;
+}
+
+// Finds the entry of that name, in upper or lower case, with one of the endings; empty if there is
+// none.
+fs::path FindEntry(const std::vector<fs::path>& entries, const std::string& name,
+                   const std::vector<std::string>& endings) {
+  std::vector<fs::path> found;
+  for (const fs::path& entry : entries) {
+    const std::string lower = LowerCase(entry.filename().string());
+    if (std::ranges::any_of(endings, [&](const auto& ending) { return lower == name + ending; })) {
+      found.push_back(entry);
+    }
+  }
+  if (found.size() > 1) {
+    throw InputError(fmt::format("{}: both {} and {} are there; keep one",
+                                 found[0].parent_path().string(), found[0].filename().string(),
+                                 found[1].filename().string()));
+  }
+  return found.empty() ? fs::path() : found[0];
+}
+
+fs::path FindVolume(const std::vector<fs::path>& entries) {
+  std::vector<fs::path> folders;
+  std::ranges::copy_if(entries, std::back_inserter(folders),
+                       [](const fs::path& entry) { return fs::is_directory(entry); });
+  for (const char* name : {"ct", "dicom"}) {
+    if (fs::path folder = FindEntry(folders, name, {""}); !folder.empty()) {
+      return folder;
+    }
+  }
+  return FindEntry(entries, "volume",
+                   {".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".inv3"});
+}
+
+// The subject in a folder; nothing if the folder contains none.
+std::optional<Subject> FindSubject(const fs::path& folder) {
+  const std::vector<std::string> meshes = {".ply", ".obj", ".stl", ".off"};
+  const std::vector<fs::path> entries = Sorted(folder);
+  const fs::path landmarks = FindEntry(
+      entries, "landmarks", {".yaml", ".yml", ".mrk.json", ".fcsv", ".pp", ".txt", ".asc", ".csv"});
+  const fs::path skull = FindEntry(entries, "skull", meshes),
+                 skin = FindEntry(entries, "skin", meshes);
+  if (skull.empty() != skin.empty()) {
+    throw InputError(fmt::format("{}: it has a {} and no {}; a depth needs both", folder.string(),
+                                 skull.empty() ? "skin" : "skull",
+                                 skull.empty() ? "skull" : "skin"));
+  }
+  if (!skull.empty()) {
+    FileSubject files;
+    files.skull = skull;
+    files.skin = skin;
+    files.landmarks = landmarks;
+    return files;
+  }
+  const fs::path volume = FindVolume(entries);
+  if (volume.empty()) {
+    return std::nullopt;
+  }
+  CtSubject ct;
+  ct.volume = volume;
+  ct.landmarks = landmarks;
+  return ct;
+}
+
+bool IsHiddenFolder(const fs::path& entry) { return entry.filename().string().starts_with('.'); }
+
+// Adds the subjects of the folders in a folder; adds a note for each folder without a subject.
+void AddSubjects(const fs::path& folder, PopulationFile& file, std::vector<std::string>& notes) {
+  for (const fs::path& entry : Sorted(folder)) {
+    if (!fs::is_directory(entry)) {
+      continue;
+    }
+    const std::string name = entry.filename().string();
+    if (auto subject = FindSubject(entry)) {
+      file.subjects.push_back({.name = name, .subject = std::move(*subject)});
+    } else if (!IsHiddenFolder(entry)) {
+      notes.push_back(fmt::format(
+          "{}: skipped; it contains no skull and skin, and no volume, ct or dicom", name));
+    }
+  }
+}
+
+template <class E>
+std::optional<E> ReadWord(const CsvReader& csv, const char* column) {
+  const auto at = csv.Find(column);
+  if (!at || csv.Cell(*at).empty()) {
+    return std::nullopt;
+  }
+  const auto names = EnumNames(E{});
+  const auto word = std::ranges::find(names, csv.Cell(*at));
+  if (word == names.end()) {
+    csv.Fail(fmt::format("{} is '{}'; it must be one of {}, or empty", column, csv.Cell(*at),
+                         fmt::join(names, ", ")));
+  }
+  return static_cast<E>(word - names.begin());
+}
+
+// A visitor that finds the FieldInfo of one option.
+struct FieldFinder {
+  std::string_view name;
+  FieldInfo found = {};
+
+  template <class T>
+  void operator()(const FieldInfo& info, const T&) {
+    if (info.name == name) {
+      found = info;
+    }
+  }
+};
+
+FieldInfo PersonField(std::string_view name) {
+  PopulationSubject any;
+  FieldFinder finder{.name = name};
+  Fields(finder, any);
+  return finder.found;
+}
+
+// Reads a number within the range that a configuration allows.
+std::optional<double> ReadNumber(const CsvReader& csv, const char* column) {
+  const auto at = csv.Find(column);
+  const double number = at ? csv.NumberOrNan(*at) : kNaN;
+  const FieldInfo range = PersonField(column);
+  if (number < range.min || number > range.max) {
+    csv.Fail(fmt::format("{} is {}; it must be {} to {}, or empty", column, csv.Cell(*at),
+                         range.min, range.max));
+  }
+  return std::isfinite(number) ? std::optional(number) : std::nullopt;
+}
+
+void CheckColumns(const CsvReader& csv) {
+  const std::vector<std::string>& columns = csv.Columns();
+  if (columns.size() == 1 && columns[0].find_first_of(";\t") != std::string::npos) {
+    csv.Fail(
+        "semicolons or tabs separate the columns; save the table with commas between them, "
+        "and with decimal points");
+  }
+  std::vector<std::string> known = CovariateNames();
+  known.insert(known.begin(), "name");
+  for (const std::string& column : columns) {
+    if (std::ranges::find(known, column) == known.end()) {
+      csv.Fail(fmt::format("unknown column '{}'{}", column, Suggestion(LowerCase(column), known)));
+    }
+  }
+  csv.ColumnOf("name");
+}
+
+// The subject of a row; each subject may have one row.
+PopulationSubject& FindPerson(const CsvReader& csv, std::set<std::string>& had,
+                              std::vector<PopulationSubject>& subjects) {
+  const std::string name(csv.Cell(csv.ColumnOf("name")));
+  const auto subject = std::ranges::find(subjects, name, &PopulationSubject::name);
+  if (subject == subjects.end()) {
+    std::vector<std::string> names;
+    std::ranges::transform(subjects, std::back_inserter(names), &PopulationSubject::name);
+    csv.Fail(
+        fmt::format("there is no subject '{}' in the folder{}", name, Suggestion(name, names)));
+  }
+  if (!had.insert(name).second) {
+    csv.Fail(fmt::format("'{}' has a row above; leave one out", name));
+  }
+  return *subject;
+}
+
+template <class T>
+void SetIfKnown(const std::optional<T>& value, std::optional<T>& out) {
+  out = value ? value : out;
+}
+
+void AddPersons(const fs::path& file, std::vector<PopulationSubject>& subjects) {
+  const std::string text = ReadFileBytes(file);
+  CsvReader csv(text, file.string());
+  CheckColumns(csv);
+  std::set<std::string> had;
+  while (csv.NextRow()) {
+    PopulationSubject& subject = FindPerson(csv, had, subjects);
+    SetIfKnown(ReadWord<Sex>(csv, "sex"), subject.sex);
+    SetIfKnown(ReadWord<Build>(csv, "build"), subject.build);
+    SetIfKnown(ReadNumber(csv, "age_years"), subject.age_years);
+    SetIfKnown(ReadNumber(csv, "bmi"), subject.bmi);
+  }
+}
+
+PopulationFile ReadPopulationFolder(const fs::path& given, std::vector<std::string>& notes) {
+  const fs::path folder = fs::absolute(given).lexically_normal();
+  PopulationFile file;
+  if (fs::exists(folder / "population.yaml")) {
+    file = ReadConfig<PopulationFile>(folder / "population.yaml");
+  } else {
+    file.title = fs::absolute(folder / "").lexically_normal().parent_path().filename().string();
+  }
+  AddSubjects(folder, file, notes);
+  if (file.subjects.empty() && file.phantoms.count == 0) {
+    throw InputError(fmt::format(
+        "{}: it contains no subject; each subject needs a folder with skull.ply and skin.ply, or "
+        "with volume.nii.gz or ct/ (DICOM)",
+        folder.string()));
+  }
+  if (fs::exists(folder / "subjects.csv")) {
+    AddPersons(folder / "subjects.csv", file.subjects);
+  }
+  return file;
+}
+
 }  // namespace
 
-std::string ComplaintAboutCodes(const std::vector<std::string>& codes) {
+std::string SiteCodesFault(const std::vector<std::string>& codes) {
   for (const std::string& code : codes) {
     const bool is_known = std::ranges::any_of(
         AllSites(), [&](const Site& site) { return site.code == code || site.landmark == code; });
@@ -112,12 +332,12 @@ std::string ComplaintAboutCodes(const std::vector<std::string>& codes) {
 
 PopulationPlan ReadPopulation(const fs::path& path) {
   PopulationPlan plan;
-  plan.file = fs::is_directory(path) ? FolderPopulation(path, plan.notes)
+  plan.file = fs::is_directory(path) ? ReadPopulationFolder(path, plan.notes)
                                      : ReadConfig<PopulationFile>(path);
   std::vector<PopulationSubject> subjects;
   for (const PopulationSubject& subject : plan.file.subjects) {
     if (subject.optional && IsMissing(subject)) {
-      plan.notes.push_back(fmt::format("{}: its files are not there; left out", subject.name));
+      plan.notes.push_back(fmt::format("{}: its files are missing; left out", subject.name));
     } else {
       subjects.push_back(subject);
     }
@@ -139,7 +359,8 @@ PopulationPlan ReadPopulation(const fs::path& path) {
   }
   CheckNames(plan.entries);
   if (plan.file.subjects.empty() && plan.file.phantoms.count == 0) {
-    throw InputError(fmt::format("{}: it names no subjects and no phantoms", path.string()));
+    throw InputError(
+        fmt::format("{}: it names no subjects and no phantoms; name at least one", path.string()));
   }
   return plan;
 }

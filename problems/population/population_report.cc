@@ -13,7 +13,7 @@
 #include "problems/pictures/pictures.h"
 #include "problems/plots/heat_map.h"
 #include "problems/plots/svg_plot.h"
-#include "problems/population/dense_mesh.h"
+#include "problems/population/depth_modes.h"
 #include "problems/report/report_kit.h"
 #include "problems/subject/sites.h"
 
@@ -191,7 +191,7 @@ ReportImage MapImage(const DenseMesh& mesh, const std::vector<double>& by_cell,
 ReportSection DenseSection(const PopulationResult& result) {
   constexpr double kDeepest_mm = 25, kWidest_mm = 6, kLargest_mm = 5;  // ends of the colour maps
   ReportSection section{.heading = "Depth all over the skull"};
-  const DenseMesh mesh = MeshOf(result.dense);
+  const DenseMesh mesh = MakeDenseMesh(result.dense);
   if (mesh.mesh.triangles.empty()) {
     section.paragraphs = {"No cell of the grid has a depth."};
     return section;

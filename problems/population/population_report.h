@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report of a population, as one page.
+// The report page of a population.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace semblance {
 
-// Returns HTML that contains its pictures. Nothing in it depends on time or machine.
+// Makes an HTML page with its pictures inside. Nothing in it depends on time or machine.
 std::string PopulationReport(const PopulationResult& result);
 
 }  // namespace semblance

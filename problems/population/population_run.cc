@@ -22,17 +22,17 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-fs::path FileOf(const fs::path& folder, const std::string& id) {
+fs::path ResultFile(const fs::path& folder, const std::string& id) {
   return folder / "subjects" / (id + ".json");
 }
 
-bool IsOfGrid(const DenseDepths& depths, const DenseOptions& grid) {
+bool HasGrid(const DenseDepths& depths, const DenseOptions& grid) {
   return depths.columns == grid.columns && depths.rows == grid.rows;
 }
 
-// Whether it is what MeasurePopulation writes of that subject.
-bool IsWhole(const Json& json, const std::string& id, const DenseOptions& grid) try {
-  if (json.at("status") == "done" && !IsOfGrid(SubjectDepthsOf(json.at("depths")).dense, grid)) {
+// True if the text is what MeasurePopulation writes for that subject.
+bool IsResult(const Json& json, const std::string& id, const DenseOptions& grid) try {
+  if (json.at("status") == "done" && !HasGrid(ParseSubjectDepths(json.at("depths")).dense, grid)) {
     return false;
   }
   return json.at("id") == id && json.at("status").is_string() &&
@@ -43,29 +43,29 @@ bool IsWhole(const Json& json, const std::string& id, const DenseOptions& grid) 
   return false;
 }
 
-// Nothing if it is not there, cut short, damaged or another subject's.
+// Reads a result; nothing if the file is missing, truncated, damaged or another subject's.
 std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id,
                                 const PopulationPlan& plan) {
-  const fs::path file = FileOf(folder, id);
-  if (!fs::is_regular_file(file)) {  // a pipe would be waited for
+  const fs::path file = ResultFile(folder, id);
+  if (!fs::is_regular_file(file)) {  // reading a pipe would block
     return std::nullopt;
   }
   try {
     Json json = ParseJson(ReadFileBytes(file), file.string());
-    return IsWhole(json, id, plan.file.measure.dense) ? std::optional(std::move(json))
-                                                      : std::nullopt;
+    return IsResult(json, id, plan.file.measure.dense) ? std::optional(std::move(json))
+                                                       : std::nullopt;
   } catch (const IoError&) {
     return std::nullopt;
   }
 }
 
 void WriteSubject(const fs::path& folder, const Json& json, Durability durability) {
-  WriteFileAtomically(FileOf(folder, json.at("id").get<std::string>()), json.dump() + "\n",
+  WriteFileAtomically(ResultFile(folder, json.at("id").get<std::string>()), json.dump() + "\n",
                       durability);
 }
 
-std::vector<fs::path> EntriesOf(const fs::path& folder) {
-  std::error_code error;  // what cannot be read is told by whoever writes there
+std::vector<fs::path> ListEntries(const fs::path& folder) {
+  std::error_code error;  // an unreadable folder is reported when something is written there
   std::vector<fs::path> entries;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     entries.push_back(at->path());
@@ -73,10 +73,10 @@ std::vector<fs::path> EntriesOf(const fs::path& folder) {
   return entries;
 }
 
-// The subjects that were measured there, whatever their files hold.
+// The ids of the subjects with a result in the folder, valid or not.
 std::vector<std::string> IdsIn(const fs::path& folder) {
   std::vector<std::string> ids;
-  for (const fs::path& file : EntriesOf(folder / "subjects")) {
+  for (const fs::path& file : ListEntries(folder / "subjects")) {
     if (file.extension() == ".json") {
       ids.push_back(file.stem().string());
     }
@@ -84,26 +84,27 @@ std::vector<std::string> IdsIn(const fs::path& folder) {
   return ids;
 }
 
-// Files that are being written, or were when a process was killed, do not count, nor does the
-// folder for subjects before the first is measured: another shard may just have begun.
-bool HoldsAnything(const fs::path& folder) {
+// True if the folder contains anything that counts. Temporary files of a running or killed process
+// do not count. An empty folder subjects/ does not count either, because another shard may just
+// have created it.
+bool HasContent(const fs::path& folder) {
   const auto counts = [](const fs::path& entry) {
     const std::string name = entry.filename().string();
     return !(name.starts_with('.') && name.ends_with(".tmp"));
   };
-  for (const fs::path& entry : EntriesOf(folder)) {
-    const bool begun =
-        entry.filename() == "subjects" && std::ranges::none_of(EntriesOf(entry), counts);
-    if (counts(entry) && !begun) {
+  for (const fs::path& entry : ListEntries(folder)) {
+    const bool only_begun =
+        entry.filename() == "subjects" && std::ranges::none_of(ListEntries(entry), counts);
+    if (counts(entry) && !only_begun) {
       return true;
     }
   }
   return false;
 }
 
-// What the results of another population are called; empty where there are none, or this one's.
-// Those of an older version do not tell the id.
-std::string OtherResultsIn(const fs::path& folder, const PopulationFile& file) try {
+// Title and id of another population whose results are in the folder; empty if there are no results
+// or only those of this population. Results of an older version have no id.
+std::string FindOtherResults(const fs::path& folder, const PopulationFile& file) try {
   const fs::path summary = folder / "population.json";
   if (!fs::exists(summary)) {
     return "";
@@ -121,9 +122,9 @@ std::string OtherResultsIn(const fs::path& folder, const PopulationFile& file) t
 void RequireSubjectsIn(const fs::path& folder) {
   if (!fs::is_directory(folder / "subjects")) {
     throw IoError(fmt::format(
-        "{}: {}; --from takes folders that semblance population has measured subjects into",
+        "{}: {}; --from needs folders into which semblance population has measured subjects",
         folder.string(),
-        fs::is_directory(folder) ? "there is no subjects/ in it" : "there is no such folder"));
+        fs::is_directory(folder) ? "it contains no subjects/" : "the folder does not exist"));
   }
 }
 
@@ -138,7 +139,7 @@ class PopulationRunner {
     for (std::size_t n = 0; n < plan_.entries.size(); ++n) {
       if (static_cast<int>(n % options_.shards) == options_.shard) {
         ++summary_.subjects;
-        IsThere(plan_.entries[n].id) ? void(++summary_.skipped) : queue_.push_back(n);
+        HasResult(plan_.entries[n].id) ? void(++summary_.skipped) : queue_.push_back(n);
       }
     }
     ParallelFor(queue_.size(), options_.jobs, 1, [this](std::size_t k) {
@@ -149,12 +150,12 @@ class PopulationRunner {
   }
 
  private:
-  bool IsThere(const std::string& id) const {
+  bool HasResult(const std::string& id) const {
     const auto json = ReadSubject(folder_, id, plan_);
     return json && !(options_.rerun_failed && (*json)["status"] != "done");
   }
 
-  // Made once, when the first subject without landmarks asks.
+  // The references, read once when the first subject needs them.
   std::span<const ReferenceHead> References() {
     const std::lock_guard lock(references_mutex_);
     if (!references_) {
@@ -187,7 +188,7 @@ class PopulationRunner {
       json["reason"] = error.what();
     } catch (const std::bad_alloc&) {
       json["status"] = "failed";
-      json["reason"] = "there is not enough memory for it; fewer --jobs need less";
+      json["reason"] = "not enough memory; use fewer --jobs";
     }
     return json;
   }
@@ -234,7 +235,7 @@ std::vector<MeasuredSubject> ReadMeasured(const PopulationPlan& plan, const fs::
     subject.status = (*json)["status"].get<std::string>();
     subject.reason = json->value("reason", "");
     if (subject.status == "done") {
-      subject.depths = SubjectDepthsOf(json->at("depths"));
+      subject.depths = ParseSubjectDepths(json->at("depths"));
     }
   }
   return measured;
@@ -268,19 +269,19 @@ void RefuseOtherFolder(const PopulationPlan& plan, const fs::path& folder) {
                     folder.string(), what));
   };
   const std::vector<std::string> there = IdsIn(folder);
-  if (there.empty() && HoldsAnything(folder)) {
-    refuse("the folder is not empty, and holds no population");
+  if (there.empty() && HasContent(folder)) {
+    refuse("the folder is not empty and contains no population");
   }
   const bool shares = std::ranges::any_of(plan.entries, [&](const PopulationEntry& entry) {
     return std::ranges::find(there, entry.id) != there.end();
   });
   if (!there.empty() && !shares) {
     refuse(
-        "the folder holds another population: none of its subjects is one of this, of the same "
-        "files and measured in the same way");
+        "the folder contains another population: none of its subjects has the same files and the "
+        "same options as one of this population");
   }
-  if (const std::string other = OtherResultsIn(folder, plan.file); !other.empty()) {
-    refuse(fmt::format("the folder holds another population, {}; this is '{}' (id {})", other,
+  if (const std::string other = FindOtherResults(folder, plan.file); !other.empty()) {
+    refuse(fmt::format("the folder contains another population, {}; this is '{}' (id {})", other,
                        plan.file.title, plan.file.id));
   }
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Measures the subjects of a population. Each is one file, written whole or not at all, so that a
-// population that was killed goes on where it was, and shards of it can run anywhere.
+// Measures the subjects of a population. The result of each subject is one file, written completely
+// or not at all. A killed run therefore continues where it stopped, and shards can run on any
+// machine.
 #pragma once
 
 #include <filesystem>
@@ -15,7 +16,7 @@ namespace semblance {
 
 struct PopulationRunOptions {
   int jobs = 1;               // subjects at a time
-  int shard = 0, shards = 1;  // of subjects n with n % shards == shard
+  int shard = 0, shards = 1;  // measures the subjects n with n % shards == shard
   bool rerun_failed = false;
   // May be empty. Called from one thread at a time, after each subject.
   std::function<void(int done, int of, const std::string& name, const std::string& status)>
@@ -23,14 +24,15 @@ struct PopulationRunOptions {
 };
 
 struct PopulationRunSummary {
-  int subjects = 0;  // of this shard
-  int skipped = 0;   // were there already
+  int subjects = 0;  // subjects of this shard
+  int skipped = 0;   // subjects that had a result already
   int done = 0, failed = 0;
 };
 
-// Writes subjects/<id>.json into `folder` for each subject of the shard that is not there: its
-// depths, or why it has none. The same bytes whatever the number of jobs and threads. Throws
-// IoError if the folder cannot be written; Cancelled on request, after the subjects at hand.
+// Measures each subject of the shard that has no result yet and writes subjects/<id>.json into
+// `folder`: its depths, or the reason why it has none. The bytes do not depend on the number of
+// jobs and threads. Throws IoError if the folder cannot be written. On a stop request, finishes the
+// subjects that are being measured and throws Cancelled.
 PopulationRunSummary MeasurePopulation(const PopulationPlan& plan,
                                        const std::filesystem::path& folder,
                                        const PopulationRunOptions& options,
@@ -40,31 +42,31 @@ struct MeasuredSubject {
   PopulationSubject person;
   std::string id;
   std::string status = "missing";  // done, failed or missing
-  std::string reason = {};         // of a failure
-  SubjectDepths depths = {};       // where done
+  std::string reason = {};         // reason of a failure
+  SubjectDepths depths = {};       // set if done
 };
 
-// All subjects of the plan as they lie in the folder.
+// Reads the results of all subjects of the plan from the folder.
 std::vector<MeasuredSubject> ReadMeasured(const PopulationPlan& plan,
                                           const std::filesystem::path& folder);
 
-// What another folder gave.
+// The subjects that were copied from another folder.
 struct GatheredFrom {
   std::filesystem::path folder;
-  int held = 0;   // subjects of the plan that it has
-  int taken = 0;  // of these, those that were lacking
+  int held = 0;   // subjects of the plan that the folder has
+  int taken = 0;  // subjects that were missing and were copied
 };
 
-// Copies the files of subjects of the plan that `folder` lacks from other folders, the first that
-// has one. Throws IoError, before anything is copied, for one that is not there or has no
-// subjects/.
+// Copies the results of subjects of the plan that `folder` lacks from the first of the other
+// folders that has them. Throws IoError, before anything is copied, if another folder does not
+// exist or has no subjects/.
 std::vector<GatheredFrom> GatherSubjects(const PopulationPlan& plan,
                                          const std::filesystem::path& folder,
                                          const std::vector<std::filesystem::path>& others);
 
-// Throws IoError if the folder holds anything but this population: files and no measured subject;
-// subjects of which none is in the plan; or the results of a population of another title or id. One
-// that is empty or not there holds nothing.
+// Throws IoError if the folder contains anything other than this population: files without a
+// measured subject, measured subjects of which none is in the plan, or results with another title
+// or id. A folder that is empty or does not exist is accepted.
 void RefuseOtherFolder(const PopulationPlan& plan, const std::filesystem::path& folder);
 
 }  // namespace semblance

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The measured subjects of a population as one table of numbers, and the distribution behind it.
+// The measured subjects of a population as one sample, the joint distribution fitted to it, and the
+// tissue table made of it.
 #pragma once
 
 #include <map>
@@ -7,35 +8,41 @@
 #include <string>
 #include <vector>
 
-#include "problems/conditional/fit_joint_normal.h"
+#include "problems/conditional/joint_normal.h"
+#include "problems/population/population_file.h"
 #include "problems/population/subject_depths.h"
+#include "problems/subject/tissue_table.h"
 
 namespace semblance {
 
-// A subject whose depths are there.
+// A measured subject that counts in the sample.
 struct CountedSubject {
   PopulationSubject person;
   SubjectDepths depths;
 };
 
-// What is known of a person, by the names of CovariateNames(). A phantom's body mass index is made
-// up: 25 at the thickness of an average adult, 0.45 more for each percent, and an error of 2 of its
-// own seed.
-std::map<std::string, double> CovariatesOf(const CountedSubject& subject);
+// The known covariates of a person, by the names of CovariateNames(). A phantom's body mass index
+// is made up: 25 at the thickness of an average adult, 0.45 more per percent of thickness, plus a
+// random error with sd 2 from the phantom's seed.
+std::map<std::string, double> KnownCovariates(const CountedSubject& subject);
 
-// A row per subject; a column per site that any of them has, in the order of sites.h, and then per
-// covariate. Depths at proposed landmarks of less than least_confidence are NaN.
-JointSample SampleOf(const std::vector<CountedSubject>& subjects, double least_confidence);
+// Makes a sample with a row per subject. Its columns are the sites that any subject has, in the
+// order of sites.h, and then the covariates. Depths at proposed landmarks below least_confidence
+// are NaN.
+JointSample MakeSample(const std::vector<CountedSubject>& subjects, double least_confidence);
 
-// Whether a column is a site's depth, not a covariate.
-bool IsSite(const std::string& name);
-
-// Without the columns that fewer than two subjects have, or that are the same for all.
+// Removes the columns that fewer than two subjects have, or that are the same for all.
 JointSample Varying(const JointSample& sample);
 
-// The distribution of Varying(sample), shrunk to the model's correlations; the two sides of a pair
-// have their mean's mean and the root of their variances' mean, as a table has it.
+// Fits the joint distribution of Varying(sample), shrunk towards the model's correlations. Both
+// sides of a pair get the mean of their means and the root of the mean of their variances, because
+// a tissue table has one row per pair.
 JointNormal FitPopulation(const JointSample& sample, const SiteCorrelation& model,
                           std::optional<double> shrinkage);
+
+// Makes a pooled table ("adult") with a row per site. A site that only one subject has gets a mean
+// without sd. Numbers are rounded to four decimals. `joint` must be FitPopulation(sample).
+TissueTable MakeTissueTable(const PopulationFile& file, const JointSample& sample,
+                            const JointNormal& joint);
 
 }  // namespace semblance

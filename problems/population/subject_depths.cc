@@ -7,15 +7,18 @@
 #include <cmath>
 #include <functional>
 #include <nlohmann/json.hpp>
+#include <numeric>
 
+#include "problems/face_template/template_placement.h"
 #include "problems/phantom/phantom_ct.h"
 #include "problems/pipeline/case.h"
-#include "problems/population/skull_grid.h"
 #include "problems/propose/propose_landmarks.h"
+#include "problems/subject/average_skull.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
+#include "surfaces/base/parallel.h"
 #include "surfaces/mesh/outer_surface.h"
 
 namespace semblance {
@@ -23,8 +26,107 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Of a file that the program proposed and that gives its certainty in words alone.
-double ConfidenceOf(Certainty certainty) {
+constexpr int kFormulaLevels = 3;  // levels of the generic head; 3 has all its detail
+
+// Computes the mean of a mesh's normals around a point, by area, over the normals that face alike.
+class MeanNormals {
+ public:
+  MeanNormals(const TriMesh& mesh, double radius_mm)
+      : points_(mesh.points),
+        normals_(VertexNormals(mesh)),
+        areas_(VertexAreas(mesh)),
+        order_(mesh.points.size()),
+        radius_mm_(radius_mm) {
+    std::iota(order_.begin(), order_.end(), 0);
+    std::ranges::stable_sort(order_, {}, [this](std::size_t v) { return points_[v].x(); });
+  }
+
+  // The mean of the normals within 90 degrees of the unit vector `facing`; zero if there is none.
+  Vec3 At(const Vec3& p, const Vec3& facing) const {
+    const auto x_of = [this](std::size_t v) { return points_[v].x(); };
+    const auto first = std::ranges::lower_bound(order_, p.x() - radius_mm_, {}, x_of);
+    Vec3 sum = Vec3::Zero();
+    for (auto v = first; v != order_.end() && x_of(*v) <= p.x() + radius_mm_; ++v) {
+      const bool near = (points_[*v] - p).squaredNorm() <= radius_mm_ * radius_mm_;
+      if (near && normals_[*v].dot(facing) > 0) {
+        sum += areas_[*v] * normals_[*v];
+      }
+    }
+    return sum.norm() > 0 ? Vec3(sum.normalized()) : Vec3(Vec3::Zero());
+  }
+
+ private:
+  std::vector<Vec3> points_, normals_;
+  std::vector<double> areas_;
+  std::vector<std::size_t> order_;  // the vertices sorted by x
+  double radius_mm_;
+};
+
+std::vector<SkinLandmark> StandardPoints(const LandmarkFile& file) {
+  std::vector<SkinLandmark> points;
+  for (const Landmark& landmark : file.landmarks) {
+    if (IsStandardSite(landmark.site)) {
+      points.push_back({landmark.site, landmark.Position()});
+    }
+  }
+  return points;
+}
+
+SkullSites FindSkullSites(const std::vector<SkinLandmark>& landmarks) {
+  std::vector<SitePoint> sites;
+  for (const SkinLandmark& landmark : landmarks) {
+    sites.push_back({landmark.code, landmark.point});
+  }
+  return CompleteSites(sites);
+}
+
+// One parametrisation for all skulls: the generic face's (u,v), laid on the bone. Values per cell
+// i + columns j.
+struct SkullGrid {
+  std::vector<Vec2> uv;
+  std::vector<Vec3> bone;        // on the skull, mm; NaN if no bone belongs to the cell
+  std::vector<Vec3> normals;     // unit, out of the bone; zero if there is none
+  std::vector<Vec3> in_average;  // `bone` in the frame of the average skull (average_skull.h)
+};
+
+// Lays the grid on a skull of which only the part visible from outside is given. A thin plate warps
+// the generic head so that its sites lie on the skull's landmarks (template_placement.h). Each
+// cell's centre then goes to the bone that belongs to it (skin_matcher.h), within reach_mm. Cells
+// of the same (u,v) therefore correspond exactly at the sites and approximately between them. The
+// normal is the mean of the skull's normals, by area, within normal_radius_mm. Throws InputError if
+// there are fewer than four landmarks at standard sites, or if all lie in a plane.
+SkullGrid LayGrid(const TriMesh& skull, const LandmarkFile& landmarks, const DenseOptions& options,
+                  const RunContext& context) {
+  constexpr std::size_t kMinLandmarks = 4;
+  const OuterHead head{.skin = skull, .points = StandardPoints(landmarks), .notes = {}};
+  if (head.points.size() < kMinLandmarks) {
+    throw InputError(
+        fmt::format("{}: {} landmarks at standard sites; the grid over the skull needs "
+                    "at least {}",
+                    landmarks.subject, head.points.size(), kMinLandmarks));
+  }
+  const TemplateFace generic = WarpedGenericHead(head, kFormulaLevels);
+  const MatchGrid match = MatchToSkin(generic.surface, SkinMatcher(skull), options.columns,
+                                      options.rows, options.reach_mm, context.threads);
+  const SkullSites sites = FindSkullSites(head.points);
+  const MeanNormals normals(skull, options.normal_radius_mm);
+  SkullGrid grid{.uv = match.uv,
+                 .bone = std::vector<Vec3>(match.uv.size(), Vec3::Constant(kNaN)),
+                 .normals = std::vector<Vec3>(match.uv.size(), Vec3::Zero()),
+                 .in_average = std::vector<Vec3>(match.uv.size(), Vec3::Constant(kNaN))};
+  ParallelFor(match.uv.size(), context.threads, 64, [&](std::size_t k) {
+    if (match.skin[k]) {
+      grid.bone[k] = match.skin[k]->point;
+      grid.normals[k] = normals.At(grid.bone[k], match.normals[k]);
+      grid.in_average[k] = sites.InAverage(grid.bone[k]);
+    }
+  });
+  return grid;
+}
+
+// The confidence of a landmark in a proposed file, which only has a word for it. The values lie
+// within the ranges of the words (GradeCertainty in propose_landmarks.cc: from 0.6 and 0.3).
+double ConfidenceFromWord(Certainty certainty) {
   constexpr std::array kByWord = {0.7, 0.45, 0.2};
   return kByWord.at(static_cast<std::size_t>(certainty));
 }
@@ -32,20 +134,21 @@ double ConfidenceOf(Certainty certainty) {
 struct Marked {
   LandmarkFile file;
   std::map<std::string, double> confidence;
-  std::vector<SiteDepth> dropped;  // without a depth
+  std::vector<SiteDepth> dropped;  // sites that get no depth
 };
 
 Marked Propose(const SubjectData& data, const std::string& name,
                std::span<const ReferenceHead> references, const RunContext& context) {
   if (references.empty()) {
     throw InputError(
-        "it has no landmarks, and no skull has any by which they could be proposed; name one under "
-        "measure.references");
+        "it has no landmarks, and no reference skull has any from which they could be proposed; "
+        "name "
+        "one under measure.references");
   }
   const Proposal proposal = ProposeLandmarks(data.skull, "the skull", references, context);
   if (proposal.axes != "LPS") {
-    throw InputError(fmt::format("its skull looks as if it were in {0}; write `axes: {0}` there",
-                                 proposal.axes));
+    throw InputError(
+        fmt::format("its skull seems to be in {0}; write `axes: {0}` there", proposal.axes));
   }
   Marked marked{ProposalFile(proposal, name), {}, {}};
   for (const ProposedSite& site : proposal.sites) {
@@ -57,33 +160,31 @@ Marked Propose(const SubjectData& data, const std::string& name,
 Marked AsRead(LandmarkFile file) {
   Marked marked{std::move(file), {}, {}};
   for (const Landmark& landmark : marked.file.landmarks) {
-    marked.confidence[landmark.site] = marked.file.proposed ? ConfidenceOf(landmark.certainty) : 1;
+    marked.confidence[landmark.site] =
+        marked.file.proposed ? ConfidenceFromWord(landmark.certainty) : 1;
   }
   return marked;
 }
 
-Vec3 PointOf(const Landmark& landmark) {
-  return {landmark.point[0], landmark.point[1], landmark.point[2]};
-}
-
-Box3 ExtentOf(const std::vector<Landmark>& landmarks) {
+Box3 Extent(const std::vector<Landmark>& landmarks) {
   Box3 box;
   for (const Landmark& landmark : landmarks) {
-    box.extend(PointOf(landmark));
+    box.extend(landmark.Position());
   }
   return box;
 }
 
-// Of proposed landmarks on one point the surest stays: no person has placed them, so that no person
-// has mistaken anything, and the other sites are as good as they were.
-void DropClashing(Marked& marked) {
-  const double same_mm = SamePoint_mm(ExtentOf(marked.file.landmarks));
+// Keeps, of several proposed landmarks with the same point, the one with the highest confidence.
+// For landmarks of a person this would be an error; a proposal contains no person's mistake, and
+// its other sites remain valid.
+void DropSamePoints(Marked& marked) {
+  const double same_mm = SamePoint_mm(Extent(marked.file.landmarks));
   std::vector<Landmark> by_confidence = marked.file.landmarks, kept;
   std::ranges::stable_sort(by_confidence, std::ranges::greater{},
                            [&](const Landmark& l) { return marked.confidence.at(l.site); });
   for (const Landmark& landmark : by_confidence) {
     const auto surer = std::ranges::find_if(kept, [&](const Landmark& other) {
-      return (PointOf(other) - PointOf(landmark)).norm() <= same_mm;
+      return (other.Position() - landmark.Position()).norm() <= same_mm;
     });
     if (surer == kept.end()) {
       kept.push_back(landmark);
@@ -93,7 +194,7 @@ void DropClashing(Marked& marked) {
         {.site = landmark.site,
          .confidence = marked.confidence.at(landmark.site),
          .why_not =
-             fmt::format("proposed on the point of {}; a person has to place it", surer->site)});
+             fmt::format("proposed at the point of {}; a person has to place it", surer->site)});
     std::erase_if(marked.file.landmarks,
                   [&](const Landmark& other) { return other.site == landmark.site; });
   }
@@ -105,7 +206,7 @@ bool IsExcluded(const PopulationSubject& subject, const std::string& site) {
   });
 }
 
-std::string InWords(TruthStatus status) {
+std::string DescribeStatus(TruthStatus status) {
   switch (status) {
     case TruthStatus::kValid:
       return "";
@@ -123,16 +224,17 @@ std::string InWords(TruthStatus status) {
   return "";
 }
 
-const TruthMap& By(DepthConvention convention, const DepthTruth& truth) {
+const TruthMap& ChooseMap(DepthConvention convention, const DepthTruth& truth) {
   return convention == DepthConvention::kClosestPoint ? truth.closest : truth.along_direction;
 }
 
-// Depths at points of the bone, along unit directions.
-TruthMap DepthsAt(const std::vector<Vec3>& points, const std::vector<Vec3>& directions,
-                  const TriMesh& skin, const MeasureOptions& options, const RunContext& context) {
+// Measures depths at points of the bone, along unit directions.
+TruthMap MeasureDepths(const std::vector<Vec3>& points, const std::vector<Vec3>& directions,
+                       const TriMesh& skin, const MeasureOptions& options,
+                       const RunContext& context) {
   const TriMesh bases{.points = points, .triangles = {}};
-  return By(options.convention,
-            MeasureDepthTruth(bases, directions, skin, options.depth_truth, context));
+  return ChooseMap(options.convention,
+                   MeasureDepthTruth(bases, directions, skin, options.depth_truth, context));
 }
 
 std::vector<SiteDepth> DepthsAtSites(const PopulationSubject& subject, const Marked& marked,
@@ -143,14 +245,14 @@ std::vector<SiteDepth> DepthsAtSites(const PopulationSubject& subject, const Mar
     points.push_back(dowel.base);
     directions.push_back(dowel.direction);
   }
-  const TruthMap truth = DepthsAt(points, directions, skin, options, context);
+  const TruthMap truth = MeasureDepths(points, directions, skin, options, context);
   std::vector<SiteDepth> sites;
   for (std::size_t k = 0; k < dowels.size(); ++k) {
     const bool excluded = IsExcluded(subject, dowels[k].site);
     sites.push_back({.site = dowels[k].site,
                      .depth_mm = excluded ? kNaN : truth.depth_mm[k],
                      .confidence = marked.confidence.at(dowels[k].site),
-                     .why_not = excluded ? "excluded" : InWords(truth.status[k])});
+                     .why_not = excluded ? "excluded" : DescribeStatus(truth.status[k])});
   }
   return sites;
 }
@@ -159,7 +261,7 @@ DenseDepths DepthsOverSkull(const LandmarkFile& landmarks, const TriMesh& skull,
                             const TriMesh& skin, const MeasureOptions& options,
                             const RunContext& context) {
   const SkullGrid grid = LayGrid(skull, landmarks, options.dense, context);
-  const TruthMap truth = DepthsAt(grid.bone, grid.normals, skin, options, context);
+  const TruthMap truth = MeasureDepths(grid.bone, grid.normals, skin, options, context);
   return {.columns = options.dense.columns,
           .rows = options.dense.rows,
           .bone = grid.in_average,
@@ -174,27 +276,28 @@ Json Numbers(const std::vector<double>& values) {
   return list;
 }
 
-// NaN for null.
-double NumberOf(const Json& json) {
-  constexpr double kLargest = 1e5;  // farther no mesh may lie (mesh_check.h)
+// Reads a number; null is NaN.
+double ReadNumber(const Json& json) {
+  constexpr double kLargest = 1e5;  // mm; the limit of coordinates of a mesh (mesh_check.h)
   const double number = json.is_null() ? kNaN : json.get<double>();
   if (std::abs(number) > kLargest) {
-    throw IoError(fmt::format("a subject's depths: {} is beyond every head", number));
+    throw IoError(fmt::format(
+        "a subject's depths: {} is too large for a head; at most 1e5 is allowed", number));
   }
   return number;
 }
 
-std::string SiteOf(const Json& json) {
+std::string ReadSite(const Json& json) {
   const auto site = json.get<std::string>();
-  if (!IsStandardSite(site) && !IsFurtherSite(site)) {
+  if (!IsSite(site)) {
     throw IoError(fmt::format("a subject's depths: '{}' is not a known site", site));
   }
   return site;
 }
 
-// A phantom's skull and skin as they come out of a scan of it.
-void Scan(const PhantomOptions& phantom, const PhantomScan& scan, SubjectData& data,
-          const RunContext& context) {
+// Replaces a phantom's skull and skin by those imported from a scan of it.
+void ImportScan(const PhantomOptions& phantom, const PhantomScan& scan, SubjectData& data,
+                const RunContext& context) {
   const CtVolume volume = VoxelisePhantom(
       MakePhantom(phantom),
       {.pixel_mm = scan.pixel_mm, .slice_mm = scan.slice_mm, .threads = context.threads});
@@ -215,7 +318,7 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
   Marked marked =
       open ? Propose(data, subject.name, references, context) : AsRead(std::move(data.landmarks));
   if (marked.file.proposed) {
-    DropClashing(marked);
+    DropSamePoints(marked);
   }
   data.landmarks = marked.file;
   SubjectDepths depths{.name = subject.name,
@@ -227,7 +330,7 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
   if (const auto* phantom = std::get_if<PhantomOptions>(&subject.subject)) {
     depths.thickness = MakePhantom(*phantom).thickness;
     if (subject.scan) {
-      Scan(*phantom, *subject.scan, data, context);
+      ImportScan(*phantom, *subject.scan, data, context);
     }
   } else {
     std::ranges::copy(CheckSubject(data, options.landmarks), std::back_inserter(depths.notes));
@@ -269,32 +372,33 @@ Json ToJson(const SubjectDepths& depths) {
   return json;
 }
 
-SubjectDepths SubjectDepthsOf(const Json& json) try {
+SubjectDepths ParseSubjectDepths(const Json& json) try {
   SubjectDepths depths;
   depths.name = json.at("name").get<std::string>();
   depths.proposed = json.at("proposed").get<bool>();
-  depths.thickness = NumberOf(json.at("thickness"));
+  depths.thickness = ReadNumber(json.at("thickness"));
   depths.notes = json.at("notes").get<std::vector<std::string>>();
   for (const Json& site : json.at("sites")) {
-    depths.sites.push_back({.site = SiteOf(site.at("site")),
-                            .depth_mm = NumberOf(site.at("depth_mm")),
-                            .confidence = NumberOf(site.at("confidence")),
+    depths.sites.push_back({.site = ReadSite(site.at("site")),
+                            .depth_mm = ReadNumber(site.at("depth_mm")),
+                            .confidence = ReadNumber(site.at("confidence")),
                             .why_not = site.at("why_not").get<std::string>()});
   }
   const Json& dense = json.at("dense");
   depths.dense.columns = dense.at("columns").get<int>();
   depths.dense.rows = dense.at("rows").get<int>();
   for (const Json& depth : dense.at("depth_mm")) {
-    depths.dense.depth_mm.push_back(NumberOf(depth));
+    depths.dense.depth_mm.push_back(ReadNumber(depth));
   }
   const Json& bone = dense.at("bone");
   for (std::size_t k = 0; k + 2 < bone.size(); k += 3) {
-    depths.dense.bone.emplace_back(NumberOf(bone[k]), NumberOf(bone[k + 1]), NumberOf(bone[k + 2]));
+    depths.dense.bone.emplace_back(ReadNumber(bone[k]), ReadNumber(bone[k + 1]),
+                                   ReadNumber(bone[k + 2]));
   }
   const std::size_t cells = static_cast<std::size_t>(depths.dense.columns) * depths.dense.rows;
   if (depths.dense.columns < 1 || depths.dense.rows < 1 || depths.dense.bone.size() != cells ||
       depths.dense.depth_mm.size() != cells) {
-    throw IoError("a subject's depths: the grid has not as many values as cells");
+    throw IoError("a subject's depths: the numbers of values and of cells of the grid differ");
   }
   return depths;
 } catch (const nlohmann::json::exception& error) {

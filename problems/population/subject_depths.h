@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tissue depths of one subject: at its sites, and all over its skull.
+// Measures the tissue depths of one subject: at its sites and over its whole skull.
 #pragma once
 
 #include <map>
@@ -16,37 +16,38 @@ namespace semblance {
 struct SiteDepth {
   std::string site;
   double depth_mm = kNaN;    // NaN: not measured
-  double confidence = kNaN;  // of a proposed landmark: that it is within 3 mm; 1 of a person's
-  std::string why_not;       // in words, where there is no depth
+  double confidence = kNaN;  // probability that a proposed landmark is within 3 mm; a person's: 1
+  std::string why_not;       // the reason if there is no depth
 };
 
-// On the grid of DenseOptions, i + columns j.
+// Depths on the grid of DenseOptions, cell i + columns j.
 struct DenseDepths {
   int columns = 0, rows = 0;
-  std::vector<Vec3> bone;        // in the frame of the average skull, mm; NaN where there is none
-  std::vector<double> depth_mm;  // NaN where there is none
+  std::vector<Vec3> bone;        // in the frame of the average skull, mm; NaN without bone
+  std::vector<double> depth_mm;  // NaN without a depth
 };
 
 struct SubjectDepths {
   std::string name;
-  bool proposed = false;  // its landmarks, by the program
+  bool proposed = false;  // true if the program proposed the landmarks
   std::vector<SiteDepth> sites;
   DenseDepths dense;
-  double thickness = kNaN;  // of a phantom
+  double thickness = kNaN;  // Phantom::thickness, of a phantom
   std::vector<std::string> notes;
 };
 
-// Measures a subject: its landmarks (or proposed ones) are laid on the bone, and the depth there is
-// taken to the skin that is seen from outside. references: not empty if the subject has no
-// landmarks. Of proposed landmarks on one point (landmark_mistakes.h) the surest counts; the others
-// are sites without a depth. Throws InputError as LoadSubject, CheckSubject and ProposeLandmarks,
-// and for a subject without a skin; Cancelled. The words leave the subject's name to the caller.
+// Measures a subject. Its landmarks, or proposed ones, are laid on the bone, and the depth there is
+// measured to the skin that is visible from outside. `references` must not be empty if the subject
+// has no landmarks. If several proposed landmarks have the same point (landmark_mistakes.h), the
+// one with the highest confidence counts; the others become sites without a depth. Throws
+// InputError as LoadSubject, CheckSubject and ProposeLandmarks, and for a subject without a skin;
+// throws Cancelled. The messages do not contain the subject's name; the caller adds it.
 SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOptions& options,
                              std::span<const ReferenceHead> references, const RunContext& context);
 
 nlohmann::ordered_json ToJson(const SubjectDepths& depths);
 
-// Throws IoError for what is not such a tree.
-SubjectDepths SubjectDepthsOf(const nlohmann::ordered_json& json);
+// Throws IoError if the tree is not one that ToJson writes.
+SubjectDepths ParseSubjectDepths(const nlohmann::ordered_json& json);
 
 }  // namespace semblance

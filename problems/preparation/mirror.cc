@@ -18,14 +18,14 @@
 namespace semblance {
 namespace {
 
-// Two points that mirror each other; a site of the midline is its own twin.
+// Two points that mirror each other. A site in the midline is its own twin.
 struct Twins {
   Vec3 left, right;
   Vec3 Sum() const { return left + right; }
   Vec3 Between() const { return left - right; }
 };
 
-std::vector<Twins> TwinsOf(std::span<const SitePoint> sites) {
+std::vector<Twins> FindTwins(std::span<const SitePoint> sites) {
   std::vector<Twins> twins;
   for (const Site& site : StandardSites()) {
     const auto one = std::ranges::find(sites, site.code, &SitePoint::site);
@@ -47,10 +47,11 @@ std::vector<std::vector<int>> TrianglesAtPoints(const TriMesh& mesh) {
   return at;
 }
 
-// Which triangles of a skull the other side lacks.
-class Search {
+// Finds the triangles of a skull that the other side lacks.
+class MissingBoneSearch {
  public:
-  Search(const TriMesh& skull, const MidPlane& plane, const MirrorOptions& options, int threads)
+  MissingBoneSearch(const TriMesh& skull, const MidPlane& plane, const MirrorOptions& options,
+                    int threads)
       : skull_(skull), options_(options), to_bone_mm_(skull.triangles.size()) {
     const MeshQuery query(skull);
     ParallelFor(to_bone_mm_.size(), threads, 256, [&](std::size_t t) {
@@ -78,9 +79,10 @@ class Search {
     return core;
   }
 
-  // Neighbours by neighbours, until bone is near or the core far.
+  // Grows the core from neighbour to neighbour, until mirrored bone is near the skull or the core
+  // is far.
   std::vector<bool> WithSeam(std::vector<int> reached) const {
-    constexpr double kTouching_mm = 2;
+    constexpr double kTouching_mm = 2;  // the growth stops this near to bone
     const std::vector<std::vector<int>> at_point = TrianglesAtPoints(skull_);
     std::vector<bool> missing(skull_.triangles.size());
     std::vector<int> from = reached;  // the triangle of the core that each was reached from
@@ -121,7 +123,7 @@ class Search {
 
   const TriMesh& skull_;
   const MirrorOptions& options_;
-  std::vector<double> to_bone_mm_;  // from each triangle's middle, mirrored
+  std::vector<double> to_bone_mm_;  // distance of each triangle's mirrored centroid from bone
 };
 
 void AddMirrored(const TriMesh& part, const MidPlane& plane, MirroredSkull& skull) {
@@ -138,23 +140,22 @@ void AddMirrored(const TriMesh& part, const MidPlane& plane, MirroredSkull& skul
   }
 }
 
-// The landmark of a site from the other side's, if it falls on mirrored bone.
+// Mirrors the landmark of the other side to the site, if it falls on mirrored bone.
 std::optional<Landmark> MirroredLandmark(const Site& site, const LandmarkFile& file,
                                          const MidPlane& plane, const MirroredSkull& skull,
                                          const MeshQuery& query) {
-  constexpr double kOnBone_mm = 3;
-  const auto own = std::ranges::find(file.landmarks, site.code, &Landmark::site);
-  const auto other = std::ranges::find(file.landmarks, site.mirror, &Landmark::site);
-  if (own != file.landmarks.end() || other == file.landmarks.end()) {
+  constexpr double kOnBone_mm = 3;  // the default of PlaceOptions::max_distance_mm
+  const Landmark* const other = file.Find(site.mirror);
+  if (file.Find(site.code) != nullptr || other == nullptr) {
     return std::nullopt;
   }
-  const MeshPoint at = query.Closest(plane.Mirrored(Vec3(other->point.data())));
+  const MeshPoint at = query.Closest(plane.Mirrored(other->Position()));
   if (at.distance_mm > kOnBone_mm || skull.origin[at.triangle] != BoneOrigin::kMirrored) {
     return std::nullopt;
   }
   Landmark landmark;
   landmark.site = site.code;
-  landmark.point = {at.position.x(), at.position.y(), at.position.z()};
+  landmark.MoveTo(at.position);
   landmark.certainty = Certainty::kLow;
   landmark.note = fmt::format("mirrored from {}", site.mirror);
   return landmark;
@@ -183,19 +184,52 @@ void NoteMirrored(double cm2, const char* lacking, const char* giving,
                   std::vector<std::string>& notes) {
   if (cm2 > 0) {
     notes.push_back(fmt::format(
-        "{:.1f} cm² of bone that the {} side lacks are the mirror image of the {} one's: "
-        "invented, not observed",
+        "{:.1f} cm² of bone that the {} side lacks are mirrored from the {} side: invented, not "
+        "observed",
         cm2, lacking, giving));
   }
 }
 
 }  // namespace
 
-// With s = left + right, d = left - right of each pair, the sum of squares is that of |d|^2 -
-// (n.d)^2 + (n.s - 2 c)^2: least for c half the mean of n.s, and n the least eigenvector of what is
-// left.
+std::vector<BoneOrigin> OriginOfShell(const TriMesh& shell, const TriMesh& skull,
+                                      std::span<const BoneOrigin> of_skull, int threads) {
+  constexpr double kAtBone_mm = 2;  // farther from the skull, the shell bridges a gap
+  const MeshQuery query(skull);
+  std::vector<BoneOrigin> origin(shell.triangles.size());
+  ParallelFor(origin.size(), threads, 256, [&](std::size_t t) {
+    const MeshPoint bone = query.Closest(TriangleCentroid(shell, shell.triangles[t]));
+    const BoneOrigin of_bone = of_skull.empty() ? BoneOrigin::kObserved
+                                                : of_skull[static_cast<std::size_t>(bone.triangle)];
+    origin[t] = bone.distance_mm > kAtBone_mm ? BoneOrigin::kInferred : of_bone;
+  });
+  return origin;
+}
+
+std::vector<BoneOrigin> OriginUnder(const TriMesh& face, const TriMesh& shell,
+                                    std::span<const BoneOrigin> of_shell, int threads) {
+  const MeshQuery query(shell);
+  std::vector<BoneOrigin> origin(face.points.size());
+  ParallelFor(origin.size(), threads, 256, [&](std::size_t v) {
+    origin[v] = of_shell[static_cast<std::size_t>(query.Closest(face.points[v]).triangle)];
+  });
+  return origin;
+}
+
+std::array<double, 3> AreaByOrigin_cm2(const TriMesh& mesh, std::span<const BoneOrigin> origin) {
+  std::array<double, 3> area_cm2{};
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    area_cm2[static_cast<std::size_t>(origin[t])] +=
+        TriangleAreaVector(mesh, mesh.triangles[t]).norm() / 100;
+  }
+  return area_cm2;
+}
+
+// With s = left + right and d = left - right of each pair, normal n and offset c, the sum of
+// squares is the sum of |d|^2 - (n.d)^2 + (n.s - 2 c)^2. It is least if c is half the mean of n.s
+// and n is the eigenvector of the least eigenvalue of sum (s - mean)(s - mean)' - d d'.
 MidPlane FitMidPlane(std::span<const SitePoint> sites) {
-  const std::vector<Twins> twins = TwinsOf(sites);
+  const std::vector<Twins> twins = FindTwins(sites);
   MidPlane plane;
   Vec3 mean = Vec3::Zero(), to_left = Vec3::Zero();
   for (const Twins& t : twins) {
@@ -208,11 +242,13 @@ MidPlane FitMidPlane(std::span<const SitePoint> sites) {
     sums += (t.Sum() - mean) * (t.Sum() - mean).transpose() - t.Between() * t.Between().transpose();
   }
   const Eigen::SelfAdjointEigenSolver<Mat3> eigen(sums);
-  constexpr double kLeastGap_mm2 = 100;
-  if (plane.pairs == 0 || !(eigen.eigenvalues()[1] - eigen.eigenvalues()[0] > kLeastGap_mm2)) {
+  // Two eigenvalues closer than (10 mm)^2 leave the direction of the normal undecided.
+  constexpr double kMinEigenvalueGap_mm2 = 100;
+  if (plane.pairs == 0 ||
+      !(eigen.eigenvalues()[1] - eigen.eigenvalues()[0] > kMinEigenvalueGap_mm2)) {
     throw InputError(fmt::format(
-        "mirror: {} pairs of sites and {} in the midline do not say how the mid-sagittal plane "
-        "lies; place a pair and some in the midline, apart from each other",
+        "mirror: {} pairs of sites and {} in the midline do not determine the mid-sagittal plane; "
+        "place a pair and some in the midline, apart from each other",
         plane.pairs, plane.midline));
   }
   plane.normal = eigen.eigenvectors().col(0);
@@ -230,12 +266,13 @@ MirroredSkull MirrorMissing(const TriMesh& skull, const MidPlane& plane,
                             const MirrorOptions& options, int threads) {
   MirroredSkull result{.mesh = skull, .origin = {}};
   result.origin.assign(skull.triangles.size(), BoneOrigin::kObserved);
-  const TriMesh missing = Submesh(skull, Search(skull, plane, options, threads).Run());
+  const TriMesh missing = Submesh(skull, MissingBoneSearch(skull, plane, options, threads).Run());
   const double part = Area(missing) / Area(skull);
   if (part > 0.5) {
     throw InputError(fmt::format(
         "mirror: {:.0f} % of the skull has no counterpart within {} mm on the other side: the "
-        "plane through its landmarks does not mirror it; correct them, or raise counterpart_mm",
+        "plane through its landmarks does not mirror it; correct the landmarks, or raise "
+        "counterpart_mm",
         100 * part, options.counterpart_mm));
   }
   AddMirrored(missing, plane, result);
@@ -248,11 +285,7 @@ std::vector<std::string> PrepareMirrored(const MirrorOptions& options, TriMesh& 
   if (!options.missing) {
     return {};
   }
-  std::vector<SitePoint> sites;
-  for (const Landmark& l : landmarks.landmarks) {
-    sites.push_back({l.site, Vec3(l.point.data())});
-  }
-  const MidPlane plane = FitMidPlane(sites);
+  const MidPlane plane = FitMidPlane(landmarks.Points());
   MirroredSkull mirrored = MirrorMissing(skull, plane, options, threads);
   const std::vector<std::string> added = MirrorLandmarks(plane, mirrored, landmarks);
   std::vector<std::string> notes = {fmt::format(
@@ -263,8 +296,7 @@ std::vector<std::string> PrepareMirrored(const MirrorOptions& options, TriMesh& 
   NoteMirrored(mirrored.to_right_cm2, "right", "left", notes);
   if (mirrored.to_left_cm2 + mirrored.to_right_cm2 == 0) {
     notes.push_back(
-        fmt::format("mirror: neither side lacks bone of {} cm² or more, and none is "
-                    "mirrored",
+        fmt::format("mirror: neither side lacks bone of {} cm² or more, so none is mirrored",
                     options.least_cm2));
   }
   if (!added.empty()) {

@@ -11,7 +11,7 @@
 
 #include "problems/config/config_tree.h"
 #include "problems/prior/face_prior.h"
-#include "problems/subject/landmarks.h"
+#include "problems/subject/dowel_placement.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/mesh_query.h"
 

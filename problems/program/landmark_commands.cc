@@ -20,7 +20,6 @@
 #include "problems/landmark_files/site_picture.h"
 #include "problems/output/given_files.h"
 #include "problems/program/work_options.h"
-#include "problems/propose/proposal_table.h"
 #include "problems/propose/propose_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -119,7 +118,7 @@ std::vector<ReferenceHead> ReferencesOf(const ProposeArguments& a) {
 }
 
 void TellDifferences(const ProposeArguments& a, const LandmarkFile& file) {
-  fmt::print("{}", TextOf(CompareProposal(InLpsMm(file), ReadLandmarks(a.compare).file)));
+  fmt::print("{}", FormatComparison(CompareProposal(InLpsMm(file), ReadLandmarks(a.compare).file)));
 }
 
 void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {

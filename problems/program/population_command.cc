@@ -16,7 +16,6 @@
 #include "problems/config/terminal_text.h"
 #include "problems/output/files.h"
 #include "problems/output/given_files.h"
-#include "problems/population/population_files.h"
 #include "problems/population/population_result.h"
 #include "problems/population/population_run.h"
 

@@ -20,7 +20,6 @@
 
 #include "problems/command_line/exit_code.h"
 #include "problems/ct/mr_skin.h"
-#include "problems/inputs/input_check.h"
 #include "problems/inputs/input_files.h"
 #include "problems/output/files.h"
 #include "problems/output/staged_folder.h"

@@ -20,12 +20,12 @@
 namespace semblance {
 namespace {
 
-// What the references and their mirror images say of one site.
-struct Opinions {
+// The predictions of the references and their mirror images for one site.
+struct PredictionsPerReference {
   std::vector<Vec3> points;
   std::vector<double> piece_misfits_mm;
   int references = 0;
-  double site_error_mm = kNaN;  // least of them
+  double site_error_mm = kNaN;  // the least of the references
 };
 
 double Median(const std::vector<double>& values) { return Quantile(SortedValues(values), 0.5); }
@@ -50,7 +50,8 @@ double Spread_mm(const std::vector<Vec3>& points, const Vec3& middle) {
   return std::sqrt(squares);
 }
 
-// Maxwell's distribution: the length of a normal error with the rms `rms_mm`, at 3 mm.
+// The probability that a normal error of the rms length `rms_mm` is within 3 mm (Maxwell's
+// distribution).
 double ChanceWithin3mm(double rms_mm) {
   const double x = 3 / (rms_mm / std::sqrt(3.0));
   return std::erf(x / std::sqrt(2.0)) - std::sqrt(2 / std::numbers::pi) * x * std::exp(-x * x / 2);
@@ -70,13 +71,14 @@ class Proposer {
     ChoosePose();
     context_.Report("warp");
     CarryAll();
-    const Mat3 turned = FitOf(PredictedSites()).skull_from_average.rotation;
+    const Mat3 rotation = FitSites(MedianSites()).skull_from_average.rotation;
     for (const Site& site : StandardSites()) {
-      if (const auto found = opinions_.find(site.code); found != opinions_.end()) {
-        Settle(site.code, found->second, turned);
+      if (const auto found = predictions_.find(site.code); found != predictions_.end()) {
+        PlaceSite(site.code, found->second, rotation);
       }
     }
     CheckSides();
+    FindAxes();
     return std::move(proposal_);
   }
 
@@ -90,16 +92,16 @@ class Proposer {
     for (const ReferenceHead& head : references_) {
       const SkullPose pose = FindPose(head.shell, shell_, context_.threads);
       context_.ThrowIfStopped();
-      if (ComplaintAbout(pose).empty()) {
+      if (PoseFault(pose).empty()) {
         proposal_.pose = pose;
         return;
       }
       proposal_.pose = pose;
     }
-    Fail(ComplaintAbout(proposal_.pose));
+    Fail(PoseFault(proposal_.pose));
   }
 
-  // Each reference twice: as it is, and mirrored.
+  // Carries the sites of each reference twice: as it is, and mirrored.
   void CarryAll() {
     std::vector<std::vector<WarpedSite>> carried(2 * references_.size());
     ParallelFor(carried.size(), context_.threads, 1, [&](std::size_t k) {
@@ -108,12 +110,12 @@ class Proposer {
     });
     for (std::size_t k = 0; k < carried.size(); ++k) {
       for (const WarpedSite& s : carried[k]) {
-        Opinions& opinions = opinions_[s.site];
-        opinions.points.push_back(s.point);
-        opinions.piece_misfits_mm.push_back(s.piece_misfit_mm);
-        opinions.references += k % 2 == 0;
-        opinions.site_error_mm =
-            std::fmin(opinions.site_error_mm, references_[k / 2].site_error_mm);
+        PredictionsPerReference& predictions = predictions_[s.site];
+        predictions.points.push_back(s.point);
+        predictions.piece_misfits_mm.push_back(s.piece_misfit_mm);
+        predictions.references += k % 2 == 0;
+        predictions.site_error_mm =
+            std::fmin(predictions.site_error_mm, references_[k / 2].site_error_mm);
       }
     }
   }
@@ -123,67 +125,70 @@ class Proposer {
     return CarrySites(head, shell_, pose, WarpOnto(head, shell_, pose));
   }
 
-  std::vector<SitePoint> PredictedSites() const {
+  std::vector<SitePoint> MedianSites() const {
     std::vector<SitePoint> sites;
-    for (const auto& [site, opinions] : opinions_) {
-      sites.push_back({site, Median(opinions.points)});
+    for (const auto& [site, predictions] : predictions_) {
+      sites.push_back({site, Median(predictions.points)});
     }
     return sites;
   }
 
-  SkullFit FitOf(const std::vector<SitePoint>& sites, Handedness hand = Handedness::kAsIs) const {
-    constexpr std::size_t kFewest = 6;
-    if (sites.size() < kFewest) {
+  SkullFit FitSites(const std::vector<SitePoint>& sites,
+                    Handedness hand = Handedness::kAsIs) const {
+    constexpr std::size_t kMinSites = 6;  // as FindLandmarkMistakes
+    if (sites.size() < kMinSites) {
       Fail(
-          fmt::format("only {} sites are found, and {} are needed to know the sides; add a "
+          fmt::format("only {} sites are found, and {} are needed to tell left from right; add a "
                       "--reference that has more of this skull's sites",
-                      sites.size(), kFewest));
+                      sites.size(), kMinSites));
     }
     return FitAverageSkull(sites, hand);
   }
 
-  void Settle(const std::string& site, const Opinions& opinions, const Mat3& turned) {
-    constexpr double kNoBone_mm = 8;
-    const Vec3 predicted = Median(opinions.points);
-    const SnappedSite snapped = SnapToBone(site, predicted, shell_, turned);
+  void PlaceSite(const std::string& site, const PredictionsPerReference& predictions,
+                 const Mat3& rotation) {
+    constexpr double kNoBone_mm = 8;  // a prediction so far from bone has no site on this skull
+    const Vec3 predicted = Median(predictions.points);
+    const SnappedSite snapped = SnapToBone(site, predicted, shell_, rotation);
     if (snapped.from_bone_mm > kNoBone_mm) {
       proposal_.absent.push_back(
-          {site, fmt::format("no bone within {} mm of where it is predicted: the nearest is {:.0f} "
-                             "mm away",
-                             kNoBone_mm, snapped.from_bone_mm)});
+          {site,
+           fmt::format("no bone within {} mm of the predicted point: the nearest is {:.0f} mm "
+                       "away",
+                       kNoBone_mm, snapped.from_bone_mm)});
       return;
     }
     ProposedSite found{.site = site,
                        .point = bone_.Closest(snapped.point).position,
                        .predicted = predicted,
-                       .references = opinions.references,
-                       .agreement_mm = Spread_mm(opinions.points, predicted),
-                       .piece_misfit_mm = Median(opinions.piece_misfits_mm),
+                       .references = predictions.references,
+                       .agreement_mm = Spread_mm(predictions.points, predicted),
+                       .piece_misfit_mm = Median(predictions.piece_misfits_mm),
                        .from_bone_mm = snapped.from_bone_mm,
                        .sharpness_mm = snapped.sharpness_mm};
-    Judge(opinions, found);
+    EstimateError(predictions, found);
     proposal_.sites.push_back(found);
   }
 
-  static void Judge(const Opinions& opinions, ProposedSite& site) {
-    constexpr double kNoMatch_mm = 5;  // in place of a misfit where too little bone is there
+  static void EstimateError(const PredictionsPerReference& predictions, ProposedSite& site) {
+    constexpr double kNoMatch_mm = 5;  // replaces the misfit if too little bone has a match
     const auto square = [](double x) { return x * x; };
     const double misfit_mm =
         std::isfinite(site.piece_misfit_mm) ? site.piece_misfit_mm : kNoMatch_mm;
     site.expected_error_mm =
-        std::sqrt(square(opinions.site_error_mm) / opinions.references +
-                  square(site.agreement_mm) / static_cast<double>(opinions.points.size()) +
+        std::sqrt(square(predictions.site_error_mm) / predictions.references +
+                  square(site.agreement_mm) / static_cast<double>(predictions.points.size()) +
                   square(misfit_mm) + square(site.from_bone_mm) + square(site.sharpness_mm / 2));
     site.confidence = ChanceWithin3mm(site.expected_error_mm);
   }
 
-  // Rotations are proper all the way, so sides can be exchanged only if a shape was mistaken.
+  // All rotations are proper, so the sides can be exchanged only if a shape was mistaken.
   void CheckSides() {
     std::vector<SitePoint> sites;
     for (const ProposedSite& s : proposal_.sites) {
       sites.push_back({s.site, s.point});
     }
-    const SkullFit fit = FitOf(sites);
+    const SkullFit fit = FitSites(sites);
     proposal_.skull_from_average = fit.skull_from_average;
     const Vec3 left = fit.skull_from_average.rotation.col(0);
     const bool exchanged = std::ranges::any_of(proposal_.sites, [&](const ProposedSite& s) {
@@ -191,29 +196,26 @@ class Proposer {
       return SideOfSite(s.site) == Side::kLeft && other != proposal_.sites.end() &&
              left.dot(s.point - other->point) <= 0;
     });
-    if (exchanged || FitOf(sites, Handedness::kMirrored).median_mm < fit.median_mm) {
+    if (exchanged || FitSites(sites, Handedness::kMirrored).median_mm < fit.median_mm) {
       Fail(
           "left and right came out exchanged, so the skull was not recognised; add one like it as "
           "--reference, or place the landmarks by hand");
     }
-    TellAxes();
   }
 
-  void TellAxes() {
-    constexpr double kMost_deg = 60;
+  // Concludes the axes of the skull's file from its pose; a note asks to turn a skull that is
+  // oblique.
+  void FindAxes() {
     const Mat3& turned = proposal_.skull_from_average.rotation;
-    const auto degrees = [](const Mat3& r) {
-      return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi;
-    };
-    const Mat3 ras = Vec3(-1, -1, 1).asDiagonal();
-    if (degrees(turned) <= kMost_deg) {
+    const PoseAxes axes = FindPoseAxes(turned);
+    if (axes == PoseAxes::kLps) {
       return;
     }
-    if (degrees(ras * turned) <= kMost_deg) {
+    if (axes == PoseAxes::kRas) {
       proposal_.axes = "RAS";
       proposal_.notes.push_back(fmt::format(
           "{}: the face looks to +y: the skull is RAS, and so are the proposed points (`axes: "
-          "RAS`); say `axes: RAS` under `subject` too",
+          "RAS`); write `axes: RAS` under `subject` too",
           name_));
       return;
     }
@@ -229,28 +231,43 @@ class Proposer {
   const RunContext& context_;
   MeshQuery bone_;
   SkullShell shell_;
-  std::map<std::string, Opinions> opinions_;
+  std::map<std::string, PredictionsPerReference> predictions_;  // by site
   Proposal proposal_;
 };
 
-Certainty CertaintyOf(const ProposedSite& site) {
-  constexpr double kHigh = 0.6, kMedium = 0.3;
+Certainty GradeCertainty(const ProposedSite& site) {
+  constexpr double kHigh = 0.6, kMedium = 0.3;  // probabilities to be within 3 mm
   return site.confidence >= kHigh     ? Certainty::kHigh
          : site.confidence >= kMedium ? Certainty::kMedium
                                       : Certainty::kLow;
 }
 
-std::string NoteOf(const ProposedSite& site) {
+std::string ExplainConfidence(const ProposedSite& site) {
   return fmt::format(
-      "proposed, {:.0f} % sure to 3 mm: {} agree within {:.1f} mm, bone around it fits within {}; "
-      "rule ({}) moved it by {:.1f} mm and is sharp to {:.1f} mm",
+      "proposed, {:.0f} % likely within 3 mm: {} agree within {:.1f} mm, bone around it fits "
+      "within "
+      "{}; rule ({}) moved it by {:.1f} mm and is sharp to {:.1f} mm",
       100 * site.confidence,
       site.references == 1 ? "1 reference and its mirror image"
                            : fmt::format("{} references", site.references),
       site.agreement_mm,
       std::isfinite(site.piece_misfit_mm) ? fmt::format("{:.1f} mm", site.piece_misfit_mm)
-                                          : "no measure (too little is there)",
-      RuleOf(site.site).what, (site.point - site.predicted).norm(), site.sharpness_mm);
+                                          : "an unknown distance (too little bone is there)",
+      FindSiteRule(site.site).what, (site.point - site.predicted).norm(), site.sharpness_mm);
+}
+
+SiteDifference CompareSite(const std::string& site, const Landmark* proposed,
+                           const Landmark* placed) {
+  SiteDifference difference;
+  difference.site = site;
+  if (proposed != nullptr && placed != nullptr) {
+    difference.error_mm = (proposed->Position() - placed->Position()).norm();
+    difference.proposed = proposed->certainty;
+  } else {
+    difference.remark = proposed != nullptr ? "proposed, and not placed by hand"
+                                            : "placed by hand, and not proposed";
+  }
+  return difference;
 }
 
 }  // namespace
@@ -275,12 +292,47 @@ LandmarkFile ProposalFile(const Proposal& proposal, const std::string& subject) 
   for (const ProposedSite& site : proposal.sites) {
     Landmark landmark;
     landmark.site = site.site;
-    landmark.point = {site.point.x(), site.point.y(), site.point.z()};
-    landmark.certainty = CertaintyOf(site);
-    landmark.note = NoteOf(site);
+    landmark.MoveTo(site.point);
+    landmark.certainty = GradeCertainty(site);
+    landmark.note = ExplainConfidence(site);
     file.landmarks.push_back(landmark);
   }
   return file;
+}
+
+ProposalComparison CompareProposal(const LandmarkFile& proposal, const LandmarkFile& placed) {
+  ProposalComparison comparison;
+  std::vector<double> errors_mm;
+  for (const std::string& site : StandardSiteCodes()) {
+    const Landmark* const a = proposal.Find(site);
+    const Landmark* const b = placed.Find(site);
+    if (a != nullptr || b != nullptr) {
+      comparison.sites.push_back(CompareSite(site, a, b));
+      errors_mm.push_back(comparison.sites.back().error_mm);
+    }
+  }
+  const std::vector<WeightedValue> sorted = SortedValues(errors_mm);
+  if (sorted.empty()) {
+    throw InputError("the landmarks to compare with and the proposal have no site in common");
+  }
+  comparison.compared = static_cast<int>(sorted.size());
+  comparison.median_mm = Quantile(sorted, 0.5);
+  comparison.nine_tenths_mm = Quantile(sorted, 0.9);
+  comparison.most_mm = Quantile(sorted, 1);
+  return comparison;
+}
+
+std::string FormatComparison(const ProposalComparison& comparison) {
+  std::string text = fmt::format("{:<7} {:>8}  {}\n", "site", "error mm", "proposed as");
+  for (const SiteDifference& s : comparison.sites) {
+    text += s.remark.empty()
+                ? fmt::format("{:<7} {:>8.1f}  {}\n", s.site, s.error_mm,
+                              EnumNames(s.proposed)[static_cast<std::size_t>(s.proposed)])
+                : fmt::format("{:<7} {:>8}  {}\n", s.site, "", s.remark);
+  }
+  return text + fmt::format("{} sites: median {:.1f} mm, 90 % within {:.1f} mm, most {:.1f} mm\n",
+                            comparison.compared, comparison.median_mm, comparison.nine_tenths_mm,
+                            comparison.most_mm);
 }
 
 }  // namespace semblance

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A skull whose sites are known, to be laid over one whose sites are not.
+// The outer shell of a skull, coarse and without specks, by which two skulls are aligned; and the
+// reference heads, whose sites are known, that are aligned with a skull whose sites are not.
 #pragma once
 
 #include <cstdint>
@@ -8,32 +9,55 @@
 #include <string>
 #include <vector>
 
-#include "problems/propose/skull_shell.h"
 #include "problems/subject/average_skull.h"
+#include "surfaces/mesh/correspondences.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 
+struct ShellPoint {
+  Vec3 position = Vec3::Constant(kNaN);  // mm
+  Vec3 normal = Vec3::Constant(kNaN);    // unit, outward
+};
+
+struct SkullShell {
+  TriMesh mesh;             // need not be manifold
+  Correspondences surface;  // finds closest points of the mesh and their normals
+};
+
+// Makes the shell of a skull: vertices 2 mm apart, and only triangles that are visible from outside
+// (outer_surface.h) in bodies of 3 cm^2 or more. Inner table, sinuses and specks are removed; bone
+// that is visible through orbits and openings stays. The skull must pass CheckHeadMesh. `name` is
+// for messages. Throws InputError if nothing is left, or if two bodies have the size of a skull.
+SkullShell MakeShell(const TriMesh& skull, const std::string& name, int threads);
+
+// Wraps a mesh that already is a shell.
+SkullShell AsShell(TriMesh mesh);
+
+// Points spread evenly over the shell: the centroid of the first triangle in each cell of a grid.
+std::vector<ShellPoint> SpreadPoints(const SkullShell& shell, double cell_mm);
+
 struct ReferenceHead {
   std::string name;
-  SkullShell shell;              // moved and turned onto the average skull, of its own size
-  std::vector<SitePoint> sites;  // there
-  double site_error_mm = kNaN;   // rms, by which a person's sites are expected to differ from those
-                                 // that a perfect warp of this head gives
+  SkullShell shell;              // moved and turned onto the average skull, not scaled
+  std::vector<SitePoint> sites;  // in the shell's frame
+  double site_error_mm = kNaN;   // expected rms difference between a person's sites and those of a
+                                 // perfect warp of this head
 };
 
 // Throws InputError as MakeShell and FitAverageSkull do.
 ReferenceHead MakeReference(const std::string& name, const TriMesh& skull,
                             std::span<const SitePoint> sites, int threads);
 
-// From files. Throws IoError, ConfigError or InputError if they cannot be read, or if the landmarks
-// are not the skull's (landmark_mistakes.h).
+// Reads a reference from files. Throws IoError, ConfigError or InputError if they cannot be read,
+// or if the landmarks do not belong to the skull (landmark_mistakes.h).
 ReferenceHead ReadReference(const std::filesystem::path& skull,
                             const std::filesystem::path& landmarks, int threads);
 
-// The made-up head: no one's skull, smooth, without orbits, teeth and arches.
+// A phantom as reference: a made-up smooth skull without orbits, teeth and arches.
 ReferenceHead PhantomReference(std::uint64_t random_seed);
 
-// The mirror image; its left sites are those that were right.
+// The mirror image of a head. Left and right sites exchange their names.
 ReferenceHead Mirrored(const ReferenceHead& head);
 
 }  // namespace semblance

@@ -16,8 +16,10 @@
 namespace semblance {
 namespace {
 
-// +x left, +y back, +z up. Where the definition names no extremum, or names one that lies along the
-// bone (midway, over a tooth, 10 mm below the rim), the references say it all.
+// +x is left, +y back, +z up. A rule without direction leaves the site to the references, because
+// its definition names no extremum, or one along the bone (midway, over a tooth, 10 mm below the
+// rim). The reach trades off: a larger one finds an extremum farther from the prediction, a smaller
+// one trusts the prediction more.
 const std::array kRules = {
     SiteRule{"sg", {0, 0, 0}, 0, 0, "closest bone: the hollow above glabella is too shallow"},
     SiteRule{"g", {0, -1, 0}, 8, 0, "most anterior"},
@@ -42,12 +44,12 @@ const std::array kRules = {
     SiteRule{"iM2", {0, 0, 0}, 0, 0, "closest bone: below the second molar"},
 };
 
-constexpr double kHalfMidline_mm = 1.5;
+constexpr double kHalfMidline_mm = 1.5;  // half the width of the strip of bone in the midline
 
-// What a rule asks for on one skull.
-struct Search {
+// A rule applied to one skull at one predicted point.
+struct ExtremumSearch {
   const SkullShell& skull;
-  Vec3 predicted, normal;  // of the shell
+  Vec3 predicted, normal;  // point and normal of the shell
   Vec3 along, left;        // unit
   double reach_mm;
   bool midline;
@@ -57,15 +59,15 @@ struct Search {
     return along.dot(d) - d.squaredNorm() / (2 * reach_mm);
   }
   bool Counts(std::size_t v) const {
-    constexpr double kAlike = 0.3;
+    constexpr double kMinCosine = 0.3;  // 72 degrees
     const Vec3 d = skull.mesh.points[v] - predicted;
-    return d.norm() <= 1.5 * reach_mm && skull.surface.vertex_normals()[v].dot(normal) > kAlike &&
+    return d.norm() <= 1.5 * reach_mm && skull.surface.vertex_normals()[v].dot(normal) > kMinCosine &&
            (!midline || std::abs(left.dot(d)) <= kHalfMidline_mm);
   }
 };
 
-Search SearchFor(const SiteRule& rule, std::string_view site, const ShellPoint& predicted,
-                 const SkullShell& skull, const Mat3& skull_from_average) {
+ExtremumSearch MakeSearch(const SiteRule& rule, std::string_view site, const ShellPoint& predicted,
+                          const SkullShell& skull, const Mat3& skull_from_average) {
   Vec3 along = rule.direction;
   const Side side = SideOfSite(site);
   if (side == Side::kRight) {
@@ -80,8 +82,8 @@ Search SearchFor(const SiteRule& rule, std::string_view site, const ShellPoint& 
           .midline = side == Side::kMidline};
 }
 
-// Its vertex; none where no bone counts.
-std::optional<std::size_t> Furthest(const Search& search) {
+// The vertex with the best score; nothing if no bone counts.
+std::optional<std::size_t> FindExtremum(const ExtremumSearch& search) {
   std::optional<std::size_t> best;
   double most = -std::numeric_limits<double>::infinity();
   for (std::size_t v = 0; v < search.skull.mesh.points.size(); ++v) {
@@ -94,8 +96,8 @@ std::optional<std::size_t> Furthest(const Search& search) {
   return best;
 }
 
-double Sharpness_mm(const Search& search, std::size_t best) {
-  constexpr double kAsFar_mm = 0.25;
+double Sharpness_mm(const ExtremumSearch& search, std::size_t best) {
+  constexpr double kAsFar_mm = 0.25;  // bone within this of the extremum counts as equally far
   const Vec3& top = search.skull.mesh.points[best];
   double squares = 0;
   int count = 0;
@@ -111,7 +113,7 @@ double Sharpness_mm(const Search& search, std::size_t best) {
 
 }  // namespace
 
-const SiteRule& RuleOf(std::string_view site) {
+const SiteRule& FindSiteRule(std::string_view site) {
   const auto* const found = std::ranges::find(kRules, WithoutSide(site), &SiteRule::landmark);
   if (found == kRules.end()) {
     throw InputError(fmt::format("site rules: {}", ComplaintAboutSite(site)));
@@ -121,7 +123,7 @@ const SiteRule& RuleOf(std::string_view site) {
 
 SnappedSite SnapToBone(std::string_view site, const Vec3& predicted, const SkullShell& skull,
                        const Mat3& skull_from_average) {
-  const SiteRule& rule = RuleOf(site);
+  const SiteRule& rule = FindSiteRule(site);
   const MeshPoint closest = skull.surface.query().Closest(predicted);
   SnappedSite snapped{.point = closest.position,
                       .from_bone_mm = closest.distance_mm,
@@ -129,8 +131,8 @@ SnappedSite SnapToBone(std::string_view site, const Vec3& predicted, const Skull
                       .sharpness_mm = 0};
   if (rule.reach_mm > 0) {
     const ShellPoint on_shell{closest.position, skull.surface.NormalAt(closest)};
-    const Search search = SearchFor(rule, site, on_shell, skull, skull_from_average);
-    if (const auto best = Furthest(search)) {
+    const ExtremumSearch search = MakeSearch(rule, site, on_shell, skull, skull_from_average);
+    if (const auto best = FindExtremum(search)) {
       const Vec3 inside = skull.mesh.points[*best] - rule.inset_mm * search.along;
       snapped.point = skull.surface.query().Closest(inside).position;
       snapped.sharpness_mm = Sharpness_mm(search, *best);

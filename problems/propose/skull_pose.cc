@@ -18,22 +18,23 @@
 namespace semblance {
 namespace {
 
-constexpr double kFarthest_mm = 15;  // beyond, a distance says no more
-constexpr double kLeastScale = 0.7, kMostScale = 1.4;
-constexpr double kKept = 0.7;  // of the matches; the rest are parts that only one skull has
+constexpr double kMaxDistance_mm = 15;  // a larger distance carries no more information
+constexpr double kMinScale = 0.7, kMaxScale = 1.4;
+// Fraction of the matches that is kept; the rest are parts that only one skull has.
+constexpr double kKept = 0.7;
 
-// Fewer poses, more points.
+// A stage of the search. Each stage refines fewer poses on more points than the one before.
 struct Stage {
-  double cell_mm;
+  double cell_mm;  // distance of the points
   int rounds;
-  std::size_t poses;  // that go on from the stage before
+  std::size_t poses;  // number of poses that the stage refines
 };
 constexpr Stage kFirst = {.cell_mm = 40, .rounds = 5, .poses = 144};
 constexpr Stage kMiddle = {.cell_mm = 20, .rounds = 12, .poses = 12};
 constexpr Stage kLast = {.cell_mm = 8, .rounds = 20, .poses = 1};
-constexpr double kSearchCell_mm = 6;  // of the shells that the first two are searched on
+constexpr double kSearchCell_mm = 6;  // cell of the coarse shells on which the search runs
 
-// Two skulls, and the points of each that are asked for the other.
+// Two shells, and the points of each that are matched with the other.
 struct ShellPair {
   const SkullShell& reference;
   const SkullShell& skull;
@@ -48,7 +49,7 @@ struct ShellPair {
 
 constexpr CorrespondenceOptions kSameWay = {.least_cosine = 0.34};  // within 70 degrees
 
-ShellMatch MatchOf(const ShellPoint& from, const ShellPoint& to) {
+ShellMatch MakeMatch(const ShellPoint& from, const ShellPoint& to) {
   return {.from = from.position,
           .to = to.position,
           .normal = to.normal,
@@ -65,22 +66,22 @@ std::vector<ShellMatch> MatchBothWays(const ShellPair& pair, const Similarity& p
   for (const ShellPoint& p : pair.of_reference) {
     const ShellPoint moved = Moved(p, pose);
     const auto to = pair.skull.surface.Find(moved.position, moved.normal, kSameWay);
-    matches.push_back(to ? MatchOf(moved, {to->point.position, to->normal}) : ShellMatch());
+    matches.push_back(to ? MakeMatch(moved, {to->point.position, to->normal}) : ShellMatch());
   }
   for (const ShellPoint& q : pair.of_skull) {
     const auto from =
         pair.reference.surface.Find(back * q.position, back.rotation * q.normal, kSameWay);
-    matches.push_back(from ? MatchOf(Moved({from->point.position, from->normal}, pose), q)
+    matches.push_back(from ? MakeMatch(Moved({from->point.position, from->normal}, pose), q)
                            : ShellMatch());
   }
   return matches;
 }
 
-// Of the share that is kept: what only one skull has says nothing of its pose.
+// The mean distance of the kept matches. Parts that only one skull has do not count.
 double Misfit_mm(const std::vector<ShellMatch>& matches) {
   std::vector<double> distances_mm;
   for (const ShellMatch& m : matches) {
-    distances_mm.push_back(std::fmin(m.distance_mm, kFarthest_mm));  // the latter without a match
+    distances_mm.push_back(std::fmin(m.distance_mm, kMaxDistance_mm));  // the latter without a match
   }
   std::ranges::sort(distances_mm);
   distances_mm.resize(static_cast<std::size_t>(kKept * static_cast<double>(matches.size())));
@@ -94,14 +95,14 @@ struct Candidate {
   double misfit_mm = std::numeric_limits<double>::infinity();
 };
 
-Candidate Refined(const ShellPair& pair, Similarity pose, int rounds) {
+Candidate Refine(const ShellPair& pair, Similarity pose, int rounds) {
   for (int round = 0; round < rounds; ++round) {
     const std::vector<ShellMatch> kept = KeepClosest(MatchBothWays(pair, pose), kKept);
-    if (kept.size() < 20) {
+    if (kept.size() < 20) {  // too few for a stable step
       break;
     }
     Similarity step = StepTowards(kept, /*scale_too=*/true);
-    const double scale = std::clamp(step.scale * pose.scale, kLeastScale, kMostScale);
+    const double scale = std::clamp(step.scale * pose.scale, kMinScale, kMaxScale);
     step.scale = scale / pose.scale;
     pose = step * pose;
   }
@@ -109,17 +110,17 @@ Candidate Refined(const ShellPair& pair, Similarity pose, int rounds) {
   return {pose, std::isfinite(misfit_mm) ? misfit_mm : std::numeric_limits<double>::infinity()};
 }
 
-// The best first; of equals, the one that came first.
-std::vector<Candidate> RefinedAll(const ShellPair& pair, const std::vector<Similarity>& poses,
-                                  int rounds, int threads) {
+// Refines all poses and sorts them, the best first. Ties keep their order.
+std::vector<Candidate> RefineAll(const ShellPair& pair, const std::vector<Similarity>& poses,
+                                 int rounds, int threads) {
   std::vector<Candidate> candidates(poses.size());
   ParallelFor(poses.size(), threads, 1,
-              [&](std::size_t k) { candidates[k] = Refined(pair, poses[k], rounds); });
+              [&](std::size_t k) { candidates[k] = Refine(pair, poses[k], rounds); });
   std::ranges::stable_sort(candidates, {}, &Candidate::misfit_mm);
   return candidates;
 }
 
-// The proper rotations of a cube.
+// The 24 proper rotations of a cube.
 std::vector<Mat3> CubeRotations() {
   std::vector<Mat3> rotations;
   std::array<int, 3> axis = {0, 1, 2};
@@ -139,10 +140,10 @@ std::vector<Mat3> CubeRotations() {
 
 struct Frame {
   Vec3 middle = Vec3::Zero();
-  Mat3 axes = Mat3::Identity();  // principal, right-handed
+  Mat3 axes = Mat3::Identity();  // principal axes, right-handed
 };
 
-Frame FrameOf(const std::vector<ShellPoint>& points) {
+Frame PrincipalFrame(const std::vector<ShellPoint>& points) {
   Frame frame;
   for (const ShellPoint& p : points) {
     frame.middle += p.position / static_cast<double>(points.size());
@@ -158,7 +159,7 @@ Frame FrameOf(const std::vector<ShellPoint>& points) {
 }
 
 std::vector<Similarity> Starts(const ShellPair& pair) {
-  const Frame reference = FrameOf(pair.of_reference), skull = FrameOf(pair.of_skull);
+  const Frame reference = PrincipalFrame(pair.of_reference), skull = PrincipalFrame(pair.of_skull);
   std::vector<Similarity> starts;
   for (const Mat3& turn : CubeRotations()) {
     for (const Mat3& rotation : {Mat3(skull.axes * turn * reference.axes.transpose()), turn}) {
@@ -172,7 +173,7 @@ std::vector<Similarity> Starts(const ShellPair& pair) {
   return starts;
 }
 
-std::vector<Similarity> PosesOf(const std::vector<Candidate>& candidates, std::size_t count) {
+std::vector<Similarity> FirstPoses(const std::vector<Candidate>& candidates, std::size_t count) {
   std::vector<Similarity> poses;
   for (std::size_t k = 0; k < std::min(count, candidates.size()); ++k) {
     poses.push_back(candidates[k].pose);
@@ -184,6 +185,7 @@ double Degrees(const Mat3& rotation) {
   return Eigen::AngleAxisd(rotation).angle() * 180 / std::numbers::pi;
 }
 
+// The misfit of the best candidate that differs from the very best by more than a small turn.
 double RivalMisfit_mm(const std::vector<Candidate>& candidates) {
   constexpr double kTurned_deg = 45;
   const Mat3& best = candidates.front().pose.rotation;
@@ -220,8 +222,8 @@ std::vector<ShellMatch> KeepClosest(const std::vector<ShellMatch>& matches, doub
 }
 
 Similarity StepTowards(const std::vector<ShellMatch>& matches, bool scale_too) {
-  constexpr double kAcross = 0.1;  // weight of distances across the normal: points may slide
-  constexpr double kMostTurn = 0.3, kMostGrowth = 0.1;
+  constexpr double kAcross = 0.1;  // weight of distances across the normal; small: points may slide
+  constexpr double kMaxTurn = 0.3, kMaxGrowth = 0.1;  // radians, log scale; they damp the step
   Vec3 middle = Vec3::Zero();
   for (const ShellMatch& m : matches) {
     middle += m.from / static_cast<double>(matches.size());
@@ -236,12 +238,12 @@ Similarity StepTowards(const std::vector<ShellMatch>& matches, bool scale_too) {
     normal_matrix += jacobian.transpose() * weight * jacobian;
     right += jacobian.transpose() * weight * (m.to - m.from);
   }
-  normal_matrix.diagonal().array() += 1e-6;  // also where the scale is not asked for
+  normal_matrix.diagonal().array() += 1e-6;  // keeps it regular without scale and for few matches
   const Eigen::Matrix<double, 7, 1> x = normal_matrix.ldlt().solve(right);
   Vec3 turn = x.head<3>();
-  turn *= std::min(1.0, kMostTurn / std::max(turn.norm(), 1e-12));
+  turn *= std::min(1.0, kMaxTurn / std::max(turn.norm(), 1e-12));
   Similarity step;
-  step.scale = std::exp(std::clamp(x[6], -kMostGrowth, kMostGrowth));
+  step.scale = std::exp(std::clamp(x[6], -kMaxGrowth, kMaxGrowth));
   if (turn.norm() > 1e-12) {
     step.rotation = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
   }
@@ -253,13 +255,13 @@ SkullPose FindPose(const SkullShell& reference, const SkullShell& skull, int thr
   const SkullShell from = AsShell(ClusterVertices(reference.mesh, kSearchCell_mm));
   const SkullShell to = AsShell(ClusterVertices(skull.mesh, kSearchCell_mm));
   const auto refine = [&](const Stage& stage, const std::vector<Similarity>& poses) {
-    return RefinedAll(ShellPair(from, to, stage.cell_mm), poses, stage.rounds, threads);
+    return RefineAll(ShellPair(from, to, stage.cell_mm), poses, stage.rounds, threads);
   };
   const std::vector<Candidate> all = refine(kFirst, Starts(ShellPair(from, to, kFirst.cell_mm)));
-  const std::vector<Candidate> some = refine(kMiddle, PosesOf(all, kMiddle.poses));
+  const std::vector<Candidate> some = refine(kMiddle, FirstPoses(all, kMiddle.poses));
   constexpr int kRoundsToRest = 40;
   const ShellPair fine(from, to, kLast.cell_mm);
-  return {.skull_from_reference = Refined(fine, some.front().pose, kRoundsToRest).pose,
+  return {.skull_from_reference = Refine(fine, some.front().pose, kRoundsToRest).pose,
           .misfit_mm = some.front().misfit_mm,
           .rival_misfit_mm = RivalMisfit_mm(some)};
 }
@@ -271,20 +273,22 @@ Similarity RefinePose(const SkullShell& reference, const SkullShell& skull,
   const Similarity back = Inverse(skull_from_reference);
   std::erase_if(pair.of_reference, [&](const ShellPoint& p) { return !counts(p.position); });
   std::erase_if(pair.of_skull, [&](const ShellPoint& q) { return !counts(back * q.position); });
-  return Refined(pair, skull_from_reference, kLast.rounds).pose;
+  return Refine(pair, skull_from_reference, kLast.rounds).pose;
 }
 
-std::string ComplaintAbout(const SkullPose& pose) {
-  constexpr double kWorst_mm = 6, kClear = 0.85;
-  if (!(pose.misfit_mm < kWorst_mm)) {
+std::string PoseFault(const SkullPose& pose) {
+  constexpr double kMaxMisfit_mm = 6;      // more is no skull
+  constexpr double kMaxRivalRatio = 0.85;  // best over rival misfit; nearer to 1 is undecided
+  if (!(pose.misfit_mm < kMaxMisfit_mm)) {
     return fmt::format(
         "no pose brings it within {} mm of a skull (mean distance, best {:.1f} mm); check that the "
         "file holds a skull, its unit, and that nothing else is in it",
-        kWorst_mm, pose.misfit_mm);
+        kMaxMisfit_mm, pose.misfit_mm);
   }
-  if (pose.misfit_mm > kClear * pose.rival_misfit_mm) {
+  if (pose.misfit_mm > kMaxRivalRatio * pose.rival_misfit_mm) {
     return fmt::format(
-        "its shape does not say how it lies: the best pose is off by {:.1f} mm and one turned by "
+        "its shape does not determine its pose: the best pose is off by {:.1f} mm and one turned "
+        "by "
         "more than 45 degrees by {:.1f} mm; check that the file holds a skull, or add one like it "
         "as --reference",
         pose.misfit_mm, pose.rival_misfit_mm);

@@ -11,9 +11,9 @@
 namespace semblance {
 namespace {
 
-constexpr double kLeastCosine = 0.5;  // normals within 60 degrees
+constexpr double kMinCosine = 0.5;  // normals within 60 degrees face alike
 
-// Points of the reference and where they belong on the skull.
+// Points of the reference with the points of the skull that they belong to.
 struct Pairs {
   std::vector<Vec3> from, to;
   std::vector<double> weights;
@@ -23,13 +23,15 @@ struct Pairs {
     if (share < 1) {
       from.push_back(source);
       to.push_back(target);
-      weights.push_back(std::max(1e-3, (1 - share * share) * (1 - share * share)));  // Tukey
+      // Tukey's weight, kept above 0.
+      weights.push_back(std::max(1e-3, (1 - share * share) * (1 - share * share)));
     }
   }
 };
 
+// Points spread over the shell, denser where is_near(position) is true.
 template <class IsNear>
-std::vector<ShellPoint> DenseWhere(const SkullShell& shell, IsNear&& is_near) {
+std::vector<ShellPoint> SpreadDenser(const SkullShell& shell, IsNear&& is_near) {
   constexpr double kNearCell_mm = 15, kFarCell_mm = 40;
   std::vector<ShellPoint> points;
   for (const ShellPoint& p : SpreadPoints(shell, kNearCell_mm)) {
@@ -66,20 +68,21 @@ class Warper {
   Warper(const ReferenceHead& reference, const SkullShell& skull, const Similarity& pose)
       : reference_(reference), skull_(skull), pose_(pose) {
     of_reference_ =
-        DenseWhere(reference.shell, [&](const Vec3& p) { return NearASite(reference, p); });
+        SpreadDenser(reference.shell, [&](const Vec3& p) { return NearASite(reference, p); });
     const Similarity back = Inverse(pose);
-    of_skull_ = DenseWhere(skull, [&](const Vec3& q) { return NearASite(reference, back * q); });
+    of_skull_ = SpreadDenser(skull, [&](const Vec3& q) { return NearASite(reference, back * q); });
     coarse_ = ClusterVertices(reference.shell.mesh, 4);
     plate_.affine << pose.scale * pose.rotation, pose.translation;
   }
 
   ThinPlate Run() {
+    // From stiff and far to soft and near, so that no round has to correct large errors locally.
     constexpr std::array kRounds = {Round{20000, 25}, Round{5000, 20}, Round{1000, 16},
                                     Round{200, 12},   Round{60, 9},    Round{20, 7}};
     for (const Round& round : kRounds) {
       const Pairs pairs = Match(round.reach_mm);
       if (pairs.from.size() < 30) {
-        break;  // nothing to go by: the pose stays
+        break;  // too few matches; the last plate, at first the pose, stays
       }
       plate_ =
           FitThinPlate(pairs.from, pairs.to, pairs.weights, {.stiffness_mm = round.stiffness_mm});
@@ -89,7 +92,7 @@ class Warper {
 
  private:
   Pairs Match(double reach_mm) const {
-    const CorrespondenceOptions match{.reach_mm = reach_mm, .least_cosine = kLeastCosine};
+    const CorrespondenceOptions match{.reach_mm = reach_mm, .least_cosine = kMinCosine};
     Pairs pairs;
     for (const ShellPoint& p : of_reference_) {
       const Vec3 moved = plate_(p.position);
@@ -106,7 +109,7 @@ class Warper {
     return pairs;
   }
 
-  // Where a point of the carried shell came from.
+  // The point of the reference from which a point of the carried shell came.
   Vec3 Before(const MeshPoint& p) const {
     const Triangle& t = coarse_.triangles[p.triangle];
     return p.weights[0] * coarse_.points[t[0]] + p.weights[1] * coarse_.points[t[1]] +
@@ -117,13 +120,14 @@ class Warper {
   const SkullShell& skull_;
   const Similarity& pose_;
   std::vector<ShellPoint> of_reference_, of_skull_;
-  TriMesh coarse_;  // of the reference, for matches from the skull
+  TriMesh coarse_;  // coarse shell of the reference, for matches from the skull
   ThinPlate plate_;
 };
 
+// Matches the points of a piece of bone, after its motion, with the skull.
 std::vector<ShellMatch> MatchPiece(const std::vector<ShellPoint>& piece, const SkullShell& skull,
                                    const Similarity& motion) {
-  constexpr CorrespondenceOptions kMatch = {.reach_mm = 6, .least_cosine = kLeastCosine};
+  constexpr CorrespondenceOptions kMatch = {.reach_mm = 6, .least_cosine = kMinCosine};
   std::vector<ShellMatch> matches;
   for (const ShellPoint& p : piece) {
     const Vec3 from = motion * p.position;
@@ -144,7 +148,7 @@ struct PieceFit {
 
 PieceFit LayPiece(const std::vector<ShellPoint>& piece, const SkullShell& skull) {
   constexpr int kRounds = 12;
-  constexpr double kKeptOfPiece = 0.8;
+  constexpr double kKeptOfPiece = 0.8;  // the rest may lack on the skull
   const std::size_t fewest = std::max<std::size_t>(12, piece.size() / 3);
   PieceFit fit;
   for (int round = 0; round <= kRounds; ++round) {
@@ -191,7 +195,7 @@ ThinPlate WarpOnto(const ReferenceHead& reference, const SkullShell& skull,
 
 std::vector<WarpedSite> CarrySites(const ReferenceHead& reference, const SkullShell& skull,
                                    const Similarity& skull_from_reference, const ThinPlate& plate) {
-  constexpr double kCell_mm = 3, kFarthest_mm = 8;
+  constexpr double kCell_mm = 3, kMaxMove_mm = 8;
   const std::vector<ShellPoint> points = SpreadPoints(reference.shell, kCell_mm);
   std::vector<WarpedSite> sites;
   for (const SitePoint& s : reference.sites) {
@@ -199,7 +203,7 @@ std::vector<WarpedSite> CarrySites(const ReferenceHead& reference, const SkullSh
     const PieceFit fit =
         LayPiece(PieceAround(s.point, points, plate, skull_from_reference.rotation), skull);
     const Vec3 laid = fit.motion * carried;
-    const bool near = (laid - carried).norm() <= kFarthest_mm;
+    const bool near = (laid - carried).norm() <= kMaxMove_mm;
     sites.push_back({s.site, near ? laid : carried, fit.misfit_mm});
   }
   return sites;

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "problems/config/config_tree.h"
-#include "problems/inputs/input_check.h"
+#include "problems/inputs/input_files.h"
 #include "problems/output/files.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/run.h"

@@ -7,7 +7,7 @@
 #include "problems/output/files.h"
 #include "problems/pictures/colour_map.h"
 #include "problems/pictures/render.h"
-#include "problems/preparation/bone_origin.h"
+#include "problems/preparation/mirror.h"
 #include "problems/run.h"
 
 namespace semblance {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "fitting/problem/placement.h"
 #include "interp/dowels/dowel.h"
@@ -18,7 +19,7 @@ namespace {
 
 struct AverageLandmark {
   std::string_view code;  // Site::landmark
-  double x, y, z;         // of a pair, on the left
+  double x, y, z;         // mm; the left one of a pair
 };
 
 constexpr AverageLandmark kAverageSkull[] = {
@@ -32,12 +33,12 @@ constexpr AverageLandmark kAverageSkull[] = {
 
 Vec3 Mirrored(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
 
-// Where the average skull has the sites, and where the subject has them.
+// The points of the same sites on the average skull and on the subject.
 struct Pairs {
   std::vector<Vec3> average, skull;
 };
 
-Pairs PairsOf(std::span<const SitePoint> sites, Handedness hand) {
+Pairs MakePairs(std::span<const SitePoint> sites, Handedness hand) {
   Pairs pairs;
   for (const SitePoint& s : sites) {
     const Vec3 average = AverageSite(s.site);
@@ -56,26 +57,29 @@ std::vector<double> Residuals(const Pairs& pairs, const Similarity& skull_from_a
   return residuals;
 }
 
-// Whether three points span a triangle that says how a skull lies.
+// True if three points span a triangle, so that they determine a pose. 1e-6 only excludes
+// round-off.
 bool Spans(const Vec3& a, const Vec3& b, const Vec3& c) {
   return (b - a).cross(c - a).norm() >
          1e-6 * std::max((b - a).squaredNorm(), (c - a).squaredNorm());
 }
 
 bool SpansABroadTriangle(const Pairs& pairs, const std::array<std::size_t, 3>& t) {
-  constexpr double kLeastDoubleArea_mm2 = 400;  // less says too little of the rotation
+  // Twice the area of a right triangle with legs of 20 mm. Smaller triangles determine the rotation
+  // too poorly to start from.
+  constexpr double kMinDoubleArea_mm2 = 400;
   const auto& a = pairs.average;
-  return (a[t[1]] - a[t[0]]).cross(a[t[2]] - a[t[0]]).norm() > kLeastDoubleArea_mm2 &&
+  return (a[t[1]] - a[t[0]]).cross(a[t[2]] - a[t[0]]).norm() > kMinDoubleArea_mm2 &&
          Spans(pairs.skull[t[0]], pairs.skull[t[1]], pairs.skull[t[2]]);
 }
 
-Similarity OfTriple(const Pairs& pairs, const std::array<std::size_t, 3>& t) {
+Similarity PoseFromTriple(const Pairs& pairs, const std::array<std::size_t, 3>& t) {
   const std::array average = {pairs.average[t[0]], pairs.average[t[1]], pairs.average[t[2]]};
   const std::array skull = {pairs.skull[t[0]], pairs.skull[t[1]], pairs.skull[t[2]]};
   return PlaceTemplate(average, skull);
 }
 
-Similarity LeastMedian(const Pairs& pairs) {
+Similarity LeastMedianPose(const Pairs& pairs) {
   Similarity best;
   double least = std::numeric_limits<double>::infinity();
   const std::size_t n = pairs.skull.size();
@@ -85,7 +89,7 @@ Similarity LeastMedian(const Pairs& pairs) {
         if (!SpansABroadTriangle(pairs, {i, j, k})) {
           continue;
         }
-        const Similarity candidate = OfTriple(pairs, {i, j, k});
+        const Similarity candidate = PoseFromTriple(pairs, {i, j, k});
         std::vector<double> residuals = Residuals(pairs, candidate);
         const double median = UpperMedian(residuals);
         if (median < least) {
@@ -97,25 +101,27 @@ Similarity LeastMedian(const Pairs& pairs) {
   }
   if (!std::isfinite(least)) {
     throw InputError(
-        fmt::format("landmarks: three that are apart and not on a line are needed to say how the "
-                    "skull lies; place more than these {}",
+        fmt::format("landmarks: at least three that are apart and not on a line are needed to find "
+                    "the skull's pose; place more than these {}",
                     n));
   }
   return best;
 }
 
-Similarity Reweighted(const Pairs& pairs, Similarity pose) {
-  constexpr double kWidth_mm = 8, kAtRest_mm = 1e-9;
-  constexpr int kMostSteps = 500;
+// Iteratively reweighted least squares with the Cauchy loss. Its width of 8 mm is how far the three
+// measured skulls differ from each other: larger residuals are rather mistakes than anatomy.
+Similarity RefineByReweighting(const Pairs& pairs, Similarity pose) {
+  constexpr double kWidth_mm = 8, kCostTolerance = 1e-9;
+  constexpr int kMaxSteps = 500;
   double last = std::numeric_limits<double>::infinity();
-  for (int step = 0; step < kMostSteps; ++step) {
+  for (int step = 0; step < kMaxSteps; ++step) {
     std::vector<double> weights;
     double cost = 0;
     for (const double r : Residuals(pairs, pose)) {
       weights.push_back(1 / (1 + std::pow(r / kWidth_mm, 2)));
       cost += std::log1p(std::pow(r / kWidth_mm, 2));
     }
-    if (std::abs(last - cost) <= kAtRest_mm) {
+    if (std::abs(last - cost) <= kCostTolerance) {
       break;
     }
     last = cost;
@@ -142,14 +148,26 @@ Vec3 SkullFit::Predicted(std::string_view site) const {
 }
 
 SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand) {
-  const Pairs pairs = PairsOf(sites, hand);
+  const Pairs pairs = MakePairs(sites, hand);
   SkullFit fit;
   fit.mirrored = hand == Handedness::kMirrored;
-  fit.skull_from_average = Reweighted(pairs, LeastMedian(pairs));
+  fit.skull_from_average = RefineByReweighting(pairs, LeastMedianPose(pairs));
   fit.residual_mm = Residuals(pairs, fit.skull_from_average);
   std::vector<double> sorted = fit.residual_mm;
   fit.median_mm = UpperMedian(sorted);
   return fit;
+}
+
+PoseAxes FindPoseAxes(const Mat3& skull_from_average) {
+  constexpr double kMaxTurn_deg = 60;
+  const auto is_upright = [](const Mat3& r) {
+    return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi <= kMaxTurn_deg;
+  };
+  if (is_upright(skull_from_average)) {
+    return PoseAxes::kLps;
+  }
+  const Mat3 ras = Vec3(-1, -1, 1).asDiagonal();
+  return is_upright(ras * skull_from_average) ? PoseAxes::kRas : PoseAxes::kNeither;
 }
 
 Vec3 SkullSites::InAverage(const Vec3& point) const {

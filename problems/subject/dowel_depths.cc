@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <set>
+#include <utility>
 
 #include "problems/config/spelling_suggestion.h"
 #include "problems/subject/sites.h"
@@ -13,7 +16,25 @@
 namespace semblance {
 namespace {
 
-using Notes = std::vector<std::string>;
+// Notes for people, of which only those about certain sites are kept.
+class Notes {
+ public:
+  Notes() = default;  // keeps notes about all sites
+  explicit Notes(std::set<std::string> sites) : sites_(std::move(sites)) {}
+
+  bool Concern(const std::string& site) const { return !sites_ || sites_->contains(site); }
+  void Add(std::string line) { lines_.push_back(std::move(line)); }
+  void Add(const std::string& site, std::string line) {
+    if (Concern(site)) {
+      Add(std::move(line));
+    }
+  }
+  const std::vector<std::string>& Lines() const { return lines_; }
+
+ private:
+  std::optional<std::set<std::string>> sites_;
+  std::vector<std::string> lines_;
+};
 
 void CheckSetSites(const std::map<std::string, double>& set_mm) {
   std::vector<std::string> known;
@@ -34,7 +55,7 @@ void CheckSetSites(const std::map<std::string, double>& set_mm) {
   }
 }
 
-// The entry of set_mm that holds for the site: its own, else that of the pair.
+// The entry of set_mm that applies to the site: its own, otherwise that of the pair.
 std::map<std::string, double>::const_iterator FindSet(const TissueOptions& options,
                                                       const std::string& site) {
   const auto own = options.set_mm.find(site);
@@ -45,11 +66,11 @@ void NoteUnusedSets(const TissueOptions& options, const std::vector<Dowel>& dowe
   for (const auto& entry : options.set_mm) {
     const bool used = std::any_of(dowels.begin(), dowels.end(), [&](const Dowel& dowel) {
       const auto it = FindSet(options, dowel.site);
-      return it != options.set_mm.end() && it->first == entry.first;
+      return notes.Concern(dowel.site) && it != options.set_mm.end() && it->first == entry.first;
     });
     if (!used) {
-      notes.push_back(
-          fmt::format("set_mm: no dowel takes the depth of site {}", SiteInWords(entry.first)));
+      notes.Add(
+          fmt::format("set_mm: no dowel uses the depth of site {}", SiteInWords(entry.first)));
     }
   }
 }
@@ -66,8 +87,8 @@ std::vector<Dowel*> ApplySets(const TissueOptions& options, std::vector<Dowel>& 
       continue;
     }
     dowel.depth_mm = it->second;
-    notes.push_back(
-        fmt::format("site {}: depth set to {} mm by hand", SiteInWords(dowel.site), it->second));
+    notes.Add(dowel.site, fmt::format("site {}: depth set to {} mm by hand",
+                                      SiteInWords(dowel.site), it->second));
   }
   return open;
 }
@@ -76,7 +97,7 @@ void NoteUnorderedRows(const TissueTable& table, Sex sex, std::span<const std::s
                        Notes& notes) {
   const std::vector<std::string> landmarks = UnorderedLandmarks(table, sex, sites);
   if (!landmarks.empty()) {
-    notes.push_back(fmt::format(
+    notes.Add(fmt::format(
         "tissue table '{}': depth does not grow from emaciated to obese at {}; `semblance check` "
         "shows the rows",
         table.id, fmt::join(landmarks, ", ")));
@@ -85,15 +106,16 @@ void NoteUnorderedRows(const TissueTable& table, Sex sex, std::span<const std::s
 
 void SetDepth(const TissueTable& table, const TissueDepth& depth, double sds, Dowel& dowel,
               Notes& notes) {
-  constexpr double kThinnest_mm = 0.5;
+  constexpr double kMinDepth_mm = 0.5;  // a depth of 0 or less would put skin inside bone
   dowel.depth_mm = depth.mean_mm;
   dowel.sd_mm = depth.sd_mm.value_or(kNaN);
   if (sds != 0 && depth.sd_mm) {
-    dowel.depth_mm = std::max(depth.mean_mm + sds * *depth.sd_mm, kThinnest_mm);
+    dowel.depth_mm = std::max(depth.mean_mm + sds * *depth.sd_mm, kMinDepth_mm);
   }
   if (depth.flag == CellFlag::kSuspect) {
-    notes.push_back(fmt::format("site {}: the depth of {:.2f} mm in table '{}' is suspect: {}",
-                                SiteInWords(dowel.site), depth.mean_mm, table.id, depth.note));
+    notes.Add(dowel.site,
+              fmt::format("site {}: the depth of {:.2f} mm in table '{}' is suspect: {}",
+                          SiteInWords(dowel.site), depth.mean_mm, table.id, depth.note));
   }
 }
 
@@ -105,6 +127,9 @@ std::vector<Dowel*> ApplyTable(const TissueOptions& options, const TissueTable& 
   for (Dowel* dowel : open) {
     if (const auto depth = FindDepth(table, options.sex, options.build, dowel->site)) {
       SetDepth(table, *depth, options.sds, *dowel, notes);
+      if (!notes.Concern(dowel->site)) {
+        continue;
+      }
       sites.push_back(dowel->site);
       if (options.sds != 0 && !depth->sd_mm) {
         without_sd.push_back(dowel->site);
@@ -115,9 +140,9 @@ std::vector<Dowel*> ApplyTable(const TissueOptions& options, const TissueTable& 
   }
   NoteUnorderedRows(table, options.sex, sites, notes);
   if (!without_sd.empty()) {
-    notes.push_back(
-        fmt::format("tissue table '{}' states no standard deviation for {}: their mean stays, "
-                    "whatever `sds` says",
+    notes.Add(
+        fmt::format("tissue table '{}' has no standard deviation for {}: `sds` does not change "
+                    "their mean depth",
                     table.id, fmt::join(without_sd, ", ")));
   }
   return left;
@@ -127,28 +152,29 @@ void NoteFilled(const TissueTable& lacking, const TissueTable& filling,
                 const std::vector<Dowel*>& open, Notes& notes) {
   std::vector<std::string> sites;
   for (const Dowel* dowel : open) {
-    if (!std::isnan(dowel->depth_mm)) {
+    if (!std::isnan(dowel->depth_mm) && notes.Concern(dowel->site)) {
       sites.push_back(dowel->site);
     }
   }
   if (!sites.empty()) {
-    notes.push_back(fmt::format("tissue table '{}' has no depth for {}: taken from '{}'",
-                                lacking.id, fmt::join(sites, ", "), filling.id));
+    notes.Add(fmt::format("tissue table '{}' has no depth for {}: taken from '{}'", lacking.id,
+                          fmt::join(sites, ", "), filling.id));
   }
 }
 
 void NoteLeftOut(const TissueOptions& options, const TissueTable& table,
                  const std::vector<Dowel*>& left, Notes& notes) {
   for (const Dowel* dowel : left) {
-    notes.push_back(fmt::format(
-        "site {}: no depth in tissue table '{}' ({}); dowel left out. Name another table in "
-        "`fill_from`, or a depth in `set_mm`, to keep it",
-        SiteInWords(dowel->site), table.id,
-        WhyNoDepth(table, options.sex, options.build, dowel->site)));
+    notes.Add(
+        dowel->site,
+        fmt::format("site {}: no depth in tissue table '{}' ({}); dowel left out. Name another "
+                    "table in `fill_from`, or a depth in `set_mm`, to keep it",
+                    SiteInWords(dowel->site), table.id,
+                    WhyNoDepth(table, options.sex, options.build, dowel->site)));
   }
 }
 
-// Sets the depths that no table has and `given` knows; returns the dowels that still need one.
+// Sets the depths that no table has but `given` has; returns the dowels that still need one.
 std::vector<Dowel*> ApplyKnown(const TissueOptions& options, const LandmarkFile& landmarks,
                                const std::vector<Dowel*>& open, Notes& notes) {
   const std::map<std::string, double> known = KnownDepths(options.given, landmarks);
@@ -161,8 +187,9 @@ std::vector<Dowel*> ApplyKnown(const TissueOptions& options, const LandmarkFile&
     }
     dowel->depth_mm = own->second;
     dowel->sd_mm = options.given.error_mm;
-    notes.push_back(fmt::format("site {}: no table has a depth; the known one of {} mm is taken",
-                                SiteInWords(dowel->site), own->second));
+    notes.Add(dowel->site,
+              fmt::format("site {}: no table has a depth; the known depth of {} mm is used",
+                          SiteInWords(dowel->site), own->second));
   }
   return left;
 }
@@ -174,7 +201,7 @@ void FillFromTable(const TissueOptions& options, const LandmarkFile& landmarks,
   }
   if (options.table.empty()) {
     throw InputError(
-        "tissue depths come from a table, but none is given; set `table` to a file such as "
+        "tissue depths come from a table, but no table is named; set `table` to a file such as "
         "configs/tables/rhine_caucasoid.yaml, or `depths: measured`");
   }
   const TissueTable table = ReadTissueTable(options.table);
@@ -189,13 +216,11 @@ void FillFromTable(const TissueOptions& options, const LandmarkFile& landmarks,
 }
 
 const Landmark& LandmarkAt(const LandmarkFile& file, const std::string& site) {
-  for (const Landmark& landmark : file.landmarks) {
-    if (landmark.site == site) {
-      return landmark;
-    }
+  if (const Landmark* const landmark = file.Find(site); landmark != nullptr) {
+    return *landmark;
   }
   throw InputError(
-      fmt::format("site {}: no landmark has it, so it has no measured depth", SiteInWords(site)));
+      fmt::format("site {}: it has no landmark, so it has no measured depth", SiteInWords(site)));
 }
 
 void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open, Notes& notes) {
@@ -205,17 +230,19 @@ void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open,
       dowel->depth_mm = *landmark.depth_along_normal_mm;
     } else if (landmark.depth_closest_mm) {
       dowel->depth_mm = *landmark.depth_closest_mm;
-      notes.push_back(fmt::format(
-          "site {}: no depth along the normal; {:.2f} mm to the closest skin taken instead",
-          SiteInWords(dowel->site), dowel->depth_mm));
+      notes.Add(
+          dowel->site,
+          fmt::format("site {}: no depth along the normal; {:.2f} mm to the closest skin used "
+                      "instead",
+                      SiteInWords(dowel->site), dowel->depth_mm));
     } else {
-      notes.push_back(
-          fmt::format("site {}: no measured depth; dowel dropped", SiteInWords(dowel->site)));
+      notes.Add(dowel->site,
+                fmt::format("site {}: no measured depth; dowel dropped", SiteInWords(dowel->site)));
     }
   }
 }
 
-// The sites that a code means: a pair's code without side both of them.
+// The sites that a code means; the code of a pair without side means both sites.
 std::vector<std::string> SitesMeant(const std::string& code) {
   std::vector<std::string> sites;
   for (const Site& site : AllSites()) {
@@ -239,8 +266,8 @@ void AddKnown(const char* option, const std::string& site, double depth_mm,
 }
 
 std::optional<double> MeasuredAt(const LandmarkFile& file, const std::string& site) {
-  const auto at = std::ranges::find(file.landmarks, site, &Landmark::site);
-  if (at == file.landmarks.end()) {
+  const Landmark* const at = file.Find(site);
+  if (at == nullptr) {
     return std::nullopt;
   }
   return at->depth_along_normal_mm ? at->depth_along_normal_mm : at->depth_closest_mm;
@@ -261,9 +288,32 @@ void AddMeasured(const std::string& code, const LandmarkFile& file,
   }
   if (!any) {
     throw InputError(fmt::format(
-        "tissue.given.measured: {} has no measured depth in the landmarks' file; measure it there, "
-        "or give it under depths_mm",
+        "tissue.given.measured: {} has no measured depth in the landmark file; add one there, or "
+        "give the depth under depths_mm",
         SiteInWords(code)));
+  }
+}
+
+// Sets the depth of each dowel, or NaN if its site has none.
+void SetDepths(const TissueOptions& options, const LandmarkFile& landmarks,
+               std::vector<Dowel>& dowels, Notes& notes) {
+  CheckSetSites(options.set_mm);
+  const std::vector<Dowel*> open = ApplySets(options, dowels, notes);
+  NoteUnusedSets(options, dowels, notes);
+  if (options.depths == DepthSource::kTable) {
+    FillFromTable(options, landmarks, open, notes);
+  } else {
+    FillFromMeasured(landmarks, open, notes);
+  }
+}
+
+void EraseWithoutDepth(const Notes& notes, std::vector<Dowel>& dowels) {
+  std::erase_if(dowels, [](const Dowel& dowel) { return std::isnan(dowel.depth_mm); });
+  if (dowels.empty()) {
+    throw InputError(
+        fmt::format("no dowel has a tissue depth ({}); measure at least one in the landmark file, "
+                    "or name a table that has one of these sites",
+                    fmt::join(notes.Lines(), "; ")));
   }
 }
 
@@ -297,23 +347,28 @@ std::map<std::string, double> KnownDepths(const TissueGiven& given, const Landma
 
 std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
                                     std::vector<Dowel>& dowels) {
-  CheckSetSites(options.set_mm);
   Notes notes;
-  const std::vector<Dowel*> open = ApplySets(options, dowels, notes);
-  NoteUnusedSets(options, dowels, notes);
-  if (options.depths == DepthSource::kTable) {
-    FillFromTable(options, landmarks, open, notes);
-  } else {
-    FillFromMeasured(landmarks, open, notes);
+  SetDepths(options, landmarks, dowels, notes);
+  EraseWithoutDepth(notes, dowels);
+  return notes.Lines();
+}
+
+std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
+                                    std::vector<Dowel>& all, std::vector<Dowel>& used) {
+  std::set<std::string> sites;
+  for (const Dowel& dowel : used) {
+    sites.insert(dowel.site);
   }
-  std::erase_if(dowels, [](const Dowel& dowel) { return std::isnan(dowel.depth_mm); });
-  if (dowels.empty()) {
-    throw InputError(
-        fmt::format("no dowel has a tissue depth ({}); measure at least one in the landmark file, "
-                    "or name a table that has one of these sites",
-                    fmt::join(notes, "; ")));
+  Notes notes(std::move(sites));
+  SetDepths(options, landmarks, all, notes);
+  for (Dowel& dowel : used) {
+    const auto same = std::ranges::find(all, dowel.site, &Dowel::site);
+    dowel.depth_mm = same->depth_mm;
+    dowel.sd_mm = same->sd_mm;
   }
-  return notes;
+  EraseWithoutDepth(notes, all);
+  EraseWithoutDepth(notes, used);
+  return notes.Lines();
 }
 
 std::string SetFor(const TissueOptions& options, const std::string& site) {

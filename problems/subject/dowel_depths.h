@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Gives dowels their tissue depth: from a table (thesis app. A) or from what was measured on the
+// Gives dowels their tissue depth: from a table (thesis app. A) or from measurements on the
 // subject.
 #pragma once
 
@@ -24,14 +24,16 @@ constexpr auto EnumNames(DepthSource) {
   return std::to_array<std::string_view>({"table", "measured"});
 }
 
-// How depths of people go together where a table does not say: the correlation of two sites at the
-// distance d, and d' with both laid on one side of the head, is
+// A model of the correlation of depths over people, for tables without correlations. The
+// correlation of two sites at the distance d, which is d' if both are laid on one side of the head,
+// is
 //   common + twins exp(-d' / length) + (1 - common - twins - own) exp(-d / length).
+// A fat face is fat everywhere (common); left and right are alike (twins).
 struct SiteCorrelation {
-  double common = 0.45;   // a fat face is fat everywhere
-  double twins = 0.3;     // left and right are alike
-  double own = 0.1;       // what a site shares with none
-  double length_mm = 25;  // over which the rest falls to 37 %
+  double common = 0.45;
+  double twins = 0.3;
+  double own = 0.1;
+  double length_mm = 25;
 };
 template <class Visitor>
 void Fields(Visitor& visit, SiteCorrelation& o) {
@@ -48,14 +50,15 @@ void Fields(Visitor& visit, SiteCorrelation& o) {
   visit(FieldInfo{.name = "own",
                   .min = 0.001,
                   .max = 1,
-                  .doc = "part that it shares with no other, also that of measuring; what is left "
-                         "it shares with its neighbours on its side"},
+                  .doc = "part that a site shares with no other, including errors of measurement; "
+                         "the rest it shares with its neighbours on its side"},
         o.own);
   visit(FieldInfo{.name = "length_mm",
                   .unit = "mm",
                   .min = 1,
                   .max = 1000,
-                  .doc = "distance on an average skull at which neighbours share 37 % of these"},
+                  .doc =
+                      "distance on an average skull at which neighbours share 37 % of these parts"},
         o.length_mm);
 }
 template <class Report>
@@ -65,16 +68,16 @@ void CheckValue(Report& report, const SiteCorrelation& o) {
   }
 }
 
-// What is known of this person, on which a table's depths are conditioned.
+// The facts known about this person, on which a table's depths are conditioned.
 struct TissueGiven {
-  std::map<std::string, double> depths_mm;  // by site
-  std::vector<std::string> measured;        // sites of the landmarks' file, or `all`
-  double error_mm = 0;                      // sd of each of these depths
-  std::optional<Sex> sex;                   // where the table has the covariate
-  std::optional<Build> build;               // likewise
-  std::optional<double> age_years, bmi;     // likewise
-  std::filesystem::path spread;             // another table, for deviations and correlations
-  SiteCorrelation correlation;              // where the table has none
+  std::map<std::string, double> depths_mm;
+  std::vector<std::string> measured;
+  double error_mm = 0;
+  std::optional<Sex> sex;
+  std::optional<Build> build;
+  std::optional<double> age_years, bmi;
+  std::filesystem::path spread;
+  SiteCorrelation correlation;
 
   bool HasNothing() const {
     return depths_mm.empty() && measured.empty() && !sex && !build && !age_years && !bmi;
@@ -90,121 +93,130 @@ void Fields(Visitor& visit, TissueGiven& o) {
                          "means both sides. The site need not have a landmark"},
         o.depths_mm);
   visit(FieldInfo{.name = "measured",
-                  .doc = "sites whose depth in the landmarks' file is known, e.g. [g, pg, zy]; "
-                         "[all]: all that have one there"},
+                  .doc = "sites whose depth in the landmark file is known, e.g. [g, pg, zy]; "
+                         "[all]: all sites that have one there"},
         o.measured);
   visit(FieldInfo{.name = "error_mm",
                   .unit = "mm",
                   .min = 0,
                   .max = 50,
                   .doc = "standard deviation of the error of each known depth; 0: exact, and the "
-                         "dowel gets it as it is"},
+                         "dowel gets exactly this depth"},
         o.error_mm);
   visit(FieldInfo{.name = "sex",
-                  .doc = "where the table has the covariate; `tissue.sex` chooses a column of a "
-                         "table that has one for each"},
+                  .doc = "sex as a covariate, if the table has it; `tissue.sex` instead chooses a "
+                         "column of a table with a column for each sex"},
         o.sex);
-  visit(FieldInfo{.name = "build", .doc = "likewise, of `tissue.build`"}, o.build);
+  visit(FieldInfo{.name = "build", .doc = "build as a covariate, if the table has it; see sex"},
+        o.build);
   visit(
       FieldInfo{
-          .name = "age_years", .min = 0, .max = 130, .doc = "where the table has the covariate"},
+          .name = "age_years", .min = 0, .max = 130, .doc = "age, if the table has the covariate"},
       o.age_years);
   visit(FieldInfo{.name = "bmi",
                   .min = 8,
                   .max = 100,
-                  .doc = "body mass index, kg/m2, where the table has the covariate"},
+                  .doc = "body mass index, kg/m2, if the table has the covariate"},
         o.bmi);
   visit(FieldInfo{.name = "spread",
-                  .doc = "table whose standard deviations and correlations hold, where `table` "
-                         "states none; empty: `table`"},
+                  .doc = "table that provides standard deviations and correlations, if `table` "
+                         "has none; empty: `table`"},
         o.spread);
-  visit(FieldInfo{.name = "correlation",
-                  .doc = "how depths go together, where that table has no correlations"},
-        o.correlation);
+  visit(
+      FieldInfo{.name = "correlation", .doc = "model of the correlations, if that table has none"},
+      o.correlation);
 }
 
 struct TissueOptions {
-  DepthSource depths = DepthSource::kTable;  // measured: those in the landmark file
-  std::filesystem::path table;               // tissue table; for depths or a mean of it
-  std::filesystem::path fill_from;           // another table, for the sites that `table` lacks
-  Sex sex = Sex::kMale;                      // of the subject; a pooled table does not ask
-  Build build = Build::kNormal;              // of the subject; never interpolated between builds
-  double sds = 0;                            // added to the depths of a table
-  std::map<std::string, double> set_mm;      // by site, before all others
-  TissueGiven given;                         // of this person; it changes the table's depths
+  DepthSource depths = DepthSource::kTable;
+  std::filesystem::path table;
+  std::filesystem::path fill_from;
+  Sex sex = Sex::kMale;
+  Build build = Build::kNormal;  // depths are never interpolated between builds
+  double sds = 0;
+  std::map<std::string, double> set_mm;
+  TissueGiven given;
 };
 
 template <class Visitor>
 void Fields(Visitor& visit, TissueOptions& o) {
   visit(FieldInfo{.name = "depths",
-                  .doc = "table: those of a population; measured: those in the landmark file"},
+                  .doc = "table: depths of a population; measured: depths in the landmark file"},
         o.depths);
   visit(FieldInfo{.name = "table",
-                  .doc = "file of the tissue table; for depths: table, and for a scheme with mean: "
-                         "table"},
+                  .doc = "file of the tissue table; needed for depths: table, and for a scheme "
+                         "with mean: table"},
         o.table);
   visit(FieldInfo{.name = "fill_from",
-                  .doc = "another table, of the same sex and build, for the sites that `table` "
-                         "lacks; a site that both lack has no dowel"},
+                  .doc = "another table, read for the same sex and build, for the sites that "
+                         "`table` lacks; a site that both lack gets no dowel"},
         o.fill_from);
-  visit(
-      FieldInfo{.name = "sex", .doc = "of the subject; a table of pooled adults has no use for it"},
-      o.sex);
+  visit(FieldInfo{.name = "sex", .doc = "sex of the subject; a table of pooled adults ignores it"},
+        o.sex);
   visit(FieldInfo{.name = "build",
-                  .doc = "of the subject: emaciated, normal or obese; not for pooled adults"},
+                  .doc = "build of the subject: emaciated, normal or obese; a table of pooled "
+                         "adults ignores it"},
         o.build);
   visit(FieldInfo{.name = "sds",
                   .min = -3,
                   .max = 3,
                   .doc = "standard deviations that are added to each depth of a table, for faces "
-                         "fatter (1) or leaner (-1) than its mean; where a table states none, its "
-                         "mean stays, with a note; a depth stays at 0.5 mm at least"},
+                         "fatter (1) or leaner (-1) than its mean; a depth without a standard "
+                         "deviation stays at its mean, with a note; no depth gets below 0.5 mm"},
         o.sds);
   visit(FieldInfo{.name = "set_mm",
                   .unit = "mm",
                   .min = 0.01,
                   .max = 100,
-                  .doc = "depths by site, e.g. {me: 7, go_l: 12}, in place of the table's or the "
+                  .doc = "depths by site, e.g. {me: 7, go_l: 12}, that replace the table's or the "
                          "measured ones; a pair's code without side means both sides"},
         o.set_mm);
   visit(FieldInfo{.name = "given",
-                  .doc = "what is known of this person: the table's depths become what is to be "
-                         "expected of people with these depths, sex, build, age or body mass "
-                         "index, and their standard deviations what that leaves open; both go on "
-                         "into the interpolation (docs/populations.md)"},
+                  .doc = "facts known about this person: the table's depths become those "
+                         "expected for people with these depths, sex, build, age or body mass "
+                         "index, and the standard deviations become the remaining uncertainty; the "
+                         "interpolation uses both (docs/populations.md)"},
         o.given);
 }
 template <class Report>
 void CheckValue(Report& report, const TissueOptions& o) {
   if (o.depths == DepthSource::kMeasured && !o.given.HasNothing()) {
     report("given",
-           "is for the depths of a table; write `depths: table`, and the measured sites that are "
-           "to count under given.measured");
+           "applies to the depths of a table; write `depths: table`, and list the measured sites "
+           "to use under given.measured");
   }
 }
 
-// Sets depth_mm and sd_mm of each dowel. A depth under set_mm comes first (that of "go_l" before
-// that of "go"). Measured depths are those along the normal, else to the closest skin. Dowels of
-// landmarks without any measured depth, or without one in a table and in `given`, are removed.
+// Sets depth_mm and sd_mm of each dowel; both depend on the dowel's site alone. A depth under
+// set_mm takes precedence (that of "go_l" over that of "go"). A measured depth is the one along the
+// normal, otherwise the one to the closest skin. A dowel is removed if its landmark has no measured
+// depth, or if neither a table nor `given` has a depth for its site. ConditionDepths
+// (condition_depths.h), to be called afterwards, applies the rest of `given`.
 //
-// Returns what people should know: suspect cells used, rows used whose depths do not grow with the
-// build, sites filled from the second table or from `given`, entries of set_mm used and unused,
-// depths to the closest skin, dowels removed and why. What else `given` says has its own function
-// (condition_depths.h), which comes after this one. Throws InputError if a table is needed and not
-// given, if set_mm names an unknown site, if no dowel is left, or as KnownDepths; IoError and
-// ConfigError as ReadTissueTable.
+// Returns notes for people: suspect cells used, rows used whose depths do not grow with the build,
+// sites filled from the second table or from `given`, entries of set_mm used and unused, depths to
+// the closest skin, and dowels removed with the reason. Throws InputError if a table is needed and
+// not named, if set_mm names an unknown site, if no dowel is left, or as KnownDepths. Throws
+// IoError and ConfigError as ReadTissueTable.
 std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
                                     std::vector<Dowel>& dowels);
 
-// The depths that are known of this person, by site with side: of depths_mm and measured. Throws
-// InputError for a site that is unknown or appears twice, or one in `measured` without a measured
-// depth.
+// Fills two lists of dowels in one pass, so that each table is read once: `all` has a dowel for
+// every landmark, `used` one for each landmark that an experiment uses, possibly moved to another
+// point. The sites of `used` must be among those of `all`. Equal sites get equal depths. The notes
+// concern `used` alone. Throws as above, for each of the lists.
+std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
+                                    std::vector<Dowel>& all, std::vector<Dowel>& used);
+
+// The known depths of this person, by site with side: those of given.depths_mm and given.measured.
+// Throws InputError for a site that is unknown or appears twice, and for a site in `measured`
+// without a measured depth.
 std::map<std::string, double> KnownDepths(const TissueGiven& given, const LandmarkFile& landmarks);
 
-// The key of set_mm that holds for the site; empty where none does.
+// The key of set_mm that applies to the site; empty if none does.
 std::string SetFor(const TissueOptions& options, const std::string& site);
 
-// The tables that the options name and use, in the order in which they are asked.
+// The files of the tables that the options name and use, in the order in which they are searched.
 std::vector<std::filesystem::path> TablesOf(const TissueOptions& options);
 
 }  // namespace semblance

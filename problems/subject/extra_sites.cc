@@ -14,7 +14,7 @@ namespace {
 
 constexpr char kForms[] = "write [x, y, z] in mm, a landmark such as go_l, or several, as [n, rhi]";
 
-std::optional<double> NumberIn(const ConfigNode& node) {
+std::optional<double> ReadNumber(const ConfigNode& node) {
   ConfigErrors errors;
   const FieldInfo any;
   double number = kNaN;
@@ -22,10 +22,10 @@ std::optional<double> NumberIn(const ConfigNode& node) {
   return errors.size() == 0 ? std::optional(number) : std::nullopt;
 }
 
-std::optional<Vec3> PointIn(const ConfigNode& list) {
+std::optional<Vec3> ReadPoint(const ConfigNode& list) {
   Vec3 point;
   for (int axis = 0; list.items.size() == 3 && axis < 3; ++axis) {
-    const std::optional<double> number = NumberIn(list.items[axis]);
+    const std::optional<double> number = ReadNumber(list.items[axis]);
     if (!number) {
       return std::nullopt;
     }
@@ -34,11 +34,11 @@ std::optional<Vec3> PointIn(const ConfigNode& list) {
   return list.items.size() == 3 ? std::optional(point) : std::nullopt;
 }
 
-// The sites' names in `nodes`, or what is wrong with one.
-SitePlace LandmarksIn(const std::vector<ConfigNode>& nodes) {
+// The names of sites in `nodes`, or the fault of one of them.
+SitePlace ReadLandmarkNames(const std::vector<ConfigNode>& nodes) {
   SitePlace place;
   for (const ConfigNode& node : nodes) {
-    if (!node.IsScalar() || NumberIn(node)) {
+    if (!node.IsScalar() || ReadNumber(node)) {
       return {{}, {}, kForms};
     }
     if (const std::string complaint = ComplaintAboutLandmark(node.text); !complaint.empty()) {
@@ -50,24 +50,22 @@ SitePlace LandmarksIn(const std::vector<ConfigNode>& nodes) {
   return place;
 }
 
-// Of a pair, and without a side.
-bool LacksSide(const std::string& name) {
-  return IsStandardSite(name + "_l") || IsFurtherSite(name + "_l");
-}
+// True for the code of a pair without its side.
+bool LacksSide(const std::string& name) { return IsSite(name + "_l"); }
 
 }  // namespace
 
 SitePlace ReadPlace(const ConfigNode& near) {
   if (near.IsScalar()) {
-    return LandmarksIn({near});
+    return ReadLandmarkNames({near});
   }
   if (!near.IsList()) {
     return {{}, {}, kForms};
   }
-  if (const std::optional<Vec3> point = PointIn(near)) {
+  if (const std::optional<Vec3> point = ReadPoint(near)) {
     return {point, {}, ""};
   }
-  return LandmarksIn(near.items);
+  return ReadLandmarkNames(near.items);
 }
 
 std::vector<OptionFault> FaultsOfSites(const ExtraSites& sites) {
@@ -80,7 +78,7 @@ std::vector<OptionFault> FaultsOfSites(const ExtraSites& sites) {
     } else if (!complaint.empty() && !placed) {
       faults.push_back({name, complaint + " (a site of your own needs `near` or `uv`)"});
     } else if (!placed && !site.depth && !site.hold) {
-      faults.push_back({name, "nothing is said of the site; give `uv`, `near`, `depth` or `hold`"});
+      faults.push_back({name, "the site has no options; give `uv`, `near`, `depth` or `hold`"});
     }
   }
   return faults;

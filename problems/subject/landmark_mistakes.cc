@@ -8,43 +8,42 @@
 #include <array>
 #include <cmath>
 #include <functional>
-#include <numbers>
 #include <optional>
 #include <span>
 
 #include "problems/subject/average_skull.h"
-#include "problems/subject/jaw_pose.h"
+#include "problems/subject/mandible.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance {
 namespace {
 
-constexpr double kWorstFit_mm = 12;  // median residual of sites that are a skull's
-constexpr double kLeastScale = 0.7, kMostScale = 1.4;  // of a skull over the average one
+// Median residual up to which sites can be those of a skull. The three measured skulls differ by up
+// to 8 mm; a lower limit would take odd skulls for mistakes, a higher one would miss mistakes.
+constexpr double kMaxMedianResidual_mm = 12;
+constexpr double kMinScale = 0.7, kMaxScale = 1.4;  // size of a skull relative to the average one
 
-// Those that the average skull has come first.
-std::vector<SitePoint> PointsOf(const LandmarkFile& file) {
-  std::vector<SitePoint> sites;
-  for (const Landmark& l : file.landmarks) {
-    sites.push_back({l.site, {l.point[0], l.point[1], l.point[2]}});
-  }
+// The landmarks' points, standard sites first.
+std::vector<SitePoint> StandardFirst(const LandmarkFile& file) {
+  std::vector<SitePoint> sites = file.Points();
   std::stable_partition(sites.begin(), sites.end(),
                         [](const SitePoint& point) { return IsStandardSite(point.site); });
   return sites;
 }
 
-// A change that people forget, and what to say of it.
+// A conversion of the points that people forget.
 struct Change {
   std::string what, remedy;
   std::function<Vec3(const Vec3&)> apply;
-  double factor = 1;  // by which it enlarges
+  double factor = 1;  // by which it enlarges the skull
 };
 
 std::vector<Change> ForgottenChanges(const TriMesh& skull) {
   const char* const kRas =
-      "one of the files is RAS and the other LPS; say `axes: RAS` where it is, in the landmarks' "
-      "file or under `subject`";
+      "one of the files is RAS and the other LPS; write `axes: RAS` for the one that is RAS, in "
+      "the "
+      "landmark file or under `subject`";
   std::vector<Change> changes = {
       {"x and y negated", kRas, [](const Vec3& p) { return Vec3(-p.x(), -p.y(), p.z()); }}};
   for (const auto& [unit, name] :
@@ -53,7 +52,7 @@ std::vector<Change> ForgottenChanges(const TriMesh& skull) {
     const double factor = Millimetres(unit);
     changes.push_back(
         {fmt::format("multiplied by {}", factor),
-         fmt::format("the landmarks' file is not in mm; say `units: {}` in it (in YAML, which "
+         fmt::format("the landmark file is not in mm; write `units: {}` in it (in YAML, which "
                      "`semblance landmarks convert` writes)",
                      name),
          [factor](const Vec3& p) { return Vec3(factor * p); }, factor});
@@ -73,36 +72,36 @@ std::vector<Change> ForgottenChanges(const TriMesh& skull) {
   return changes;
 }
 
-class Search {
+class MistakeSearch {
  public:
-  Search(const LandmarkFile& file, const TriMesh& skull, const MeshQuery& query,
-         const PlaceOptions& options)
+  MistakeSearch(const LandmarkFile& file, const TriMesh& skull, const MeshQuery& query,
+                const PlaceOptions& options)
       : file_(file),
         skull_(skull),
         query_(query),
         options_(options),
-        sites_(PointsOf(file)),
+        sites_(StandardFirst(file)),
         standard_(std::span(sites_).first(static_cast<std::size_t>(
             std::ranges::count_if(sites_, IsStandardSite, &SitePoint::site)))),
-        who_(file.subject.empty() ? "landmarks" : fmt::format("landmarks of {}", file.subject)) {
+        label_(file.subject.empty() ? "landmarks" : fmt::format("landmarks of {}", file.subject)) {
     for (const SitePoint& s : sites_) {
       air_mm_.push_back(query.Closest(s.point).distance_mm);
     }
   }
 
   LandmarkMistakes Run() {
-    if (SamePoints()) {
+    if (FindSamePoints()) {
       return std::move(found_);
     }
     if (standard_.size() >= 6) {
       fit_ = FitAverageSkull(standard_);
     }
-    if (!(fit_ && (AnotherFrame() || NoSkull() || OpenMandible()))) {
+    if (!(fit_ && (HasAnotherFrame() || IsNoSkull() || HasOpenMandible()))) {
       if (fit_) {
-        FarOff();
+        FindSitesFarOff();
       }
-      if (!MandibleInTheAir()) {
-        InTheAir();
+      if (!MandibleIsMissing()) {
+        FindSitesInTheAir();
       }
       NoteMissingMandible();
     }
@@ -110,36 +109,38 @@ class Search {
   }
 
  private:
+  // Adds an error and returns true, so that a check can return it.
   template <class... Args>
   bool Error(fmt::format_string<Args...> format, Args&&... args) {
     found_.errors.push_back(
-        fmt::format("{}: {}", who_, fmt::format(format, std::forward<Args>(args)...)));
+        fmt::format("{}: {}", label_, fmt::format(format, std::forward<Args>(args)...)));
     return true;
   }
 
-  bool SamePoints() {
+  bool FindSamePoints() {
     Box3 box;
     for (const SitePoint& s : sites_) {
       box.extend(s.point);
     }
     const double same_mm = SamePoint_mm(box);
-    std::vector<bool> told(sites_.size(), false);
+    std::vector<bool> listed(sites_.size(), false);
     for (std::size_t i = 0; i < sites_.size(); ++i) {
       std::vector<std::string> same = {SiteInWords(sites_[i].site)};
       for (std::size_t j = i + 1; j < sites_.size(); ++j) {
-        if (!told[j] && (sites_[i].point - sites_[j].point).norm() <= same_mm) {
+        if (!listed[j] && (sites_[i].point - sites_[j].point).norm() <= same_mm) {
           same.push_back(SiteInWords(sites_[j].site));
-          told[j] = true;
+          listed[j] = true;
         }
       }
       if (same.size() > 1) {
-        Error("sites {} have the same point; place all but one anew", fmt::join(same, ", "));
+        Error("sites {} have the same point; place all but one of them again",
+              fmt::join(same, ", "));
       }
     }
     return !found_.errors.empty();
   }
 
-  double MedianAirAfter(const Change& change) const {
+  double MedianDistanceAfter(const Change& change) const {
     std::vector<double> air_mm;
     for (const SitePoint& s : sites_) {
       air_mm.push_back(query_.Closest(change.apply(s.point)).distance_mm);
@@ -151,7 +152,7 @@ class Search {
     std::optional<Change> best;
     double least_mm = options_.max_distance_mm;
     for (const Change& change : ForgottenChanges(skull_)) {
-      const double mm = OfASkullsSize(change.factor) ? MedianAirAfter(change) : kNaN;
+      const double mm = HasSkullSize(change.factor) ? MedianDistanceAfter(change) : kNaN;
       if (mm < least_mm) {
         least_mm = mm;
         best = change;
@@ -160,69 +161,67 @@ class Search {
     return best;
   }
 
-  bool OfASkullsSize(double factor = 1) const {
+  bool HasSkullSize(double factor = 1) const {
     const double scale = factor * fit_->skull_from_average.scale;
-    return scale >= kLeastScale && scale <= kMostScale;
+    return scale >= kMinScale && scale <= kMaxScale;
   }
 
-  bool AnotherFrame() {
+  bool HasAnotherFrame() {
     const auto far = std::ranges::count_if(
         air_mm_, [&](double mm) { return !(mm <= options_.max_distance_mm); });
     const bool in_air = 2 * far > std::ssize(air_mm_);
-    if (!in_air && OfASkullsSize()) {
+    if (!in_air && HasSkullSize()) {
       return false;
     }
     std::vector<double> air_mm = air_mm_;
     const std::string where =
         in_air
-            ? fmt::format("{} of {} sites are further than {} mm from the skull (median {:.1f} mm)",
+            ? fmt::format("{} of {} sites are farther than {} mm from the skull (median {:.1f} mm)",
                           far, sites_.size(), options_.max_distance_mm, UpperMedian(air_mm))
-            : fmt::format("the sites lie as on a skull of {:.3f} times the usual size",
+            : fmt::format("the sites are those of a skull of {:.3f} times the usual size",
                           fit_->skull_from_average.scale);
     if (const std::optional<Change> change = BestChange()) {
       return Error("{}; {} they fit within {:.1f} mm (median): {}", where, change->what,
-                   MedianAirAfter(*change), change->remedy);
+                   MedianDistanceAfter(*change), change->remedy);
     }
     return in_air &&
            Error("{}; check that landmarks and skull share one frame and one unit", where);
   }
 
-  // Whether the sites, taken together, are not those of a skull as it should stand.
-  bool NoSkull() {
+  // True if the sites as a whole are not those of a skull in its proper pose.
+  bool IsNoSkull() {
     const SkullFit mirrored = FitAverageSkull(standard_, Handedness::kMirrored);
-    if (mirrored.median_mm <= kWorstFit_mm && mirrored.median_mm <= 0.6 * fit_->median_mm) {
+    if (mirrored.median_mm <= kMaxMedianResidual_mm &&
+        mirrored.median_mm <= 0.6 * fit_->median_mm) {
       return Error(
           "left and right are swapped: mirrored, the sites fit an average skull within {:.1f} mm "
-          "(median), and as they are within {:.1f} mm; exchange _l and _r in the landmarks' file, "
-          "or, if the volume is a mirror image, negate x of skull, skin and landmarks",
+          "(median), and as they are within {:.1f} mm; exchange _l and _r in the landmark file, "
+          "or, "
+          "if the volume is a mirror image, negate x of skull, skin and landmarks",
           mirrored.median_mm, fit_->median_mm);
     }
-    return WrongSize() || WrongPose();
+    return HasWrongSize() || HasWrongPose();
   }
 
-  bool WrongSize() {
-    return !OfASkullsSize() &&
+  bool HasWrongSize() {
+    return !HasSkullSize() &&
            Error(
-               "the skull is {:.2f} times as large as an average one ({} to {} are taken); check "
+               "the skull is {:.2f} times as large as an average one ({} to {} are allowed); check "
                "the unit of skull and landmarks, and the voxels' size",
-               fit_->skull_from_average.scale, kLeastScale, kMostScale);
+               fit_->skull_from_average.scale, kMinScale, kMaxScale);
   }
 
-  bool WrongPose() {
-    constexpr double kMost_deg = 60;
+  bool HasWrongPose() {
     const Mat3& turned = fit_->skull_from_average.rotation;
-    const auto degrees = [](const Mat3& r) {
-      return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi;
-    };
-    if (degrees(turned) <= kMost_deg) {
+    const PoseAxes axes = FindPoseAxes(turned);
+    if (axes == PoseAxes::kLps) {
       return false;
     }
-    const Mat3 ras = Vec3(-1, -1, 1).asDiagonal();
-    if (degrees(ras * turned) <= kMost_deg) {
+    if (axes == PoseAxes::kRas) {
       return Error(
-          "the face looks to +y: x and y negated the sites fit an average skull within {:.1f} mm "
-          "(median): skull and landmarks are RAS; say `axes: RAS` under `subject` and in the "
-          "landmarks' file",
+          "the face looks to +y: with x and y negated the sites fit an average skull within {:.1f} "
+          "mm (median): skull and landmarks are RAS; write `axes: RAS` under `subject` and in the "
+          "landmark file",
           fit_->median_mm);
     }
     const Vec3 front = turned * Vec3(0, -1, 0), up = turned * Vec3(0, 0, 1);
@@ -232,20 +231,20 @@ class Search {
         front.x(), front.y(), front.z(), up.x(), up.y(), up.z());
   }
 
-  bool OpenMandible() {
+  bool HasOpenMandible() {
     const std::optional<JawPose> jaw = FindJawPose(standard_);
     return jaw && jaw->opening_deg > options_.max_opening_deg &&
            Error(
-               "the mandible is open by {0:.0f} degrees, and at most {1} are taken "
+               "the mandible is open by {0:.0f} degrees, and at most {1} are allowed "
                "(max_opening_deg): its sites are {2:.0f} mm (median) from where the upper jaw "
                "predicts them; give the mandible as a mesh of its own and close it (`subject: "
                "{{mandible: {{mesh: ..., opening_deg: -{0:.0f}}}}}`)",
                jaw->opening_deg, options_.max_opening_deg, jaw->off_mm);
   }
 
-  // The site that is predicted where this one lies, if its own landmark is not there.
-  std::string TakenFor(const SitePoint& off) const {
-    constexpr double kNear_mm = 12;
+  // Names another site that is predicted at this point and has no landmark near there.
+  std::string SuggestExchange(const SitePoint& off) const {
+    constexpr double kNear_mm = 12;  // a site this near to a predicted point may be meant for it
     for (const std::string& site : StandardSiteCodes()) {
       const auto own = std::ranges::find(sites_, site, &SitePoint::site);
       const Vec3 predicted = fit_->Predicted(site);
@@ -258,21 +257,22 @@ class Search {
     return "";
   }
 
-  void FarOff() {
+  void FindSitesFarOff() {
     for (std::size_t k = 0; k < standard_.size(); ++k) {
       const double off_mm = fit_->residual_mm[k];
       if (off_mm > options_.max_misfit_mm) {
         Error(
             "site {} is {:.0f} mm from where the other sites predict it, and at most {} mm are "
             "allowed (max_misfit_mm); correct its point or its name{}",
-            SiteInWords(sites_[k].site), off_mm, options_.max_misfit_mm, TakenFor(sites_[k]));
+            SiteInWords(sites_[k].site), off_mm, options_.max_misfit_mm,
+            SuggestExchange(sites_[k]));
       }
     }
   }
 
   bool InAir(std::size_t k) const { return !(air_mm_[k] <= options_.max_distance_mm); }
 
-  bool MandibleInTheAir() {
+  bool MandibleIsMissing() {
     int of_mandible = 0, in_air = 0, others_in_air = 0;
     for (std::size_t k = 0; k < sites_.size(); ++k) {
       const bool mandible = IsOfMandible(sites_[k].site);
@@ -287,7 +287,7 @@ class Search {
                in_air);
   }
 
-  void InTheAir() {
+  void FindSitesInTheAir() {
     for (std::size_t k = 0; k < sites_.size(); ++k) {
       if (InAir(k)) {
         Error(
@@ -299,7 +299,7 @@ class Search {
   }
 
   void NoteMissingMandible() {
-    constexpr double kNoBone_mm = 20;
+    constexpr double kNoBone_mm = 20;  // above the error of a predicted site
     const auto of_mandible = [](const auto& entry) { return IsOfMandible(entry.site); };
     if (!fit_ || std::ranges::any_of(sites_, of_mandible) ||
         std::ranges::any_of(file_.absent, of_mandible)) {
@@ -312,10 +312,9 @@ class Search {
     }
     found_.notes.push_back(fmt::format(
         "{}: there is no bone where chin and angles of the mandible are predicted: add the "
-        "mandible "
-        "to the skull's mesh, or list its sites under `absent`; the lower face is the generic "
-        "one's",
-        who_));
+        "mandible to the skull's mesh, or list its sites under `absent`; the lower face is that of "
+        "the generic face",
+        label_));
   }
 
   const LandmarkFile& file_;
@@ -323,20 +322,20 @@ class Search {
   const MeshQuery& query_;
   const PlaceOptions& options_;
   std::vector<SitePoint> sites_;
-  std::span<const SitePoint> standard_;  // of those; the average skull knows no others
-  std::string who_;
-  std::vector<double> air_mm_;  // of each site from the bone
+  std::span<const SitePoint> standard_;  // the first of sites_; the average skull has no others
+  std::string label_;
+  std::vector<double> air_mm_;  // distance of each site from the bone
   std::optional<SkullFit> fit_;
   LandmarkMistakes found_;
 };
 
 }  // namespace
 
-double SamePoint_mm(const Box3& of_all) { return std::min(0.5, 0.002 * of_all.diagonal().norm()); }
+double SamePoint_mm(const Box3& extent) { return std::min(0.5, 0.002 * extent.diagonal().norm()); }
 
 LandmarkMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
                                       const MeshQuery& query, const PlaceOptions& options) {
-  return Search(file, skull, query, options).Run();
+  return MistakeSearch(file, skull, query, options).Run();
 }
 
 }  // namespace semblance

@@ -1,41 +1,43 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mistakes that people make with a skull and its landmarks, found before anything runs, with the
-// likely remedy. Nothing is mended here.
+// Finds mistakes that people make with a skull and its landmarks before anything runs, and proposes
+// the likely remedy. Nothing is corrected here.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "problems/subject/landmarks.h"
+#include "problems/subject/dowel_placement.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 
 struct LandmarkMistakes {
   std::vector<std::string> errors;  // one line each; a subject with one cannot be used
-  std::vector<std::string> notes;   // what may be meant so
+  std::vector<std::string> notes;   // findings that may be intended
 };
 
-// So near to each other two landmarks have the same point: 0.5 mm, or 0.2 % of the extent of all if
-// that is less, for files in metres have all points within a millimetre.
-double SamePoint_mm(const Box3& of_all);
+// The distance below which two landmarks count as one point: 0.5 mm, or 0.2 % of the diagonal of
+// `extent`, the box of all landmarks, if that is less. The latter is for files in metres, where all
+// points lie within a millimetre.
+double SamePoint_mm(const Box3& extent);
 
-// In this order; what explains the rest ends the search.
-//   same point      sites within SamePoint_mm of each other
-//   another frame   more than half of the sites further than max_distance_mm from the bone, or of
-//                   another size than a skull: whether negated axes or another unit would lay them
-//                   on the bone (median at most that far)
-//   sides swapped   the mirrored average skull fits, the average skull does not (median residual at
-//                   most 12 mm, and at most 0.6 times the other): _l and _r exchanged, or a
-//                   mirrored volume, which look alike
-//   size            0.7 to 1.4 times the average skull is a skull
-//   pose            turned by more than 60 degrees from LPS: whether it is RAS
-//   mandible open   by more than max_opening_deg (jaw_pose.h)
-//   far off         a site further than max_misfit_mm from where the others predict it
-//   mandible        all its sites in the air; a note where none is given, none is called absent and
-//                   no bone is near
-//   in the air      a site further than max_distance_mm from the bone
-// From six sites on; fewer are looked at for same points and for air alone.
+// Searches for the mistakes below in this order. A mistake that explains the later ones ends the
+// search.
+//   same point      Sites lie within SamePoint_mm of each other.
+//   another frame   More than half of the sites are farther than max_distance_mm from the bone, or
+//                   their size is not that of a skull. Tries whether negated axes or another unit
+//                   would lay them on the bone (median distance at most max_distance_mm).
+//   sides swapped   The mirrored average skull fits and the average skull does not (median residual
+//                   at most 12 mm, and at most 0.6 times the other). Either _l and _r are exchanged
+//                   or the volume is mirrored; the two look alike.
+//   size            The skull is not 0.7 to 1.4 times as large as the average skull.
+//   pose            The skull is turned by more than 60 degrees from LPS. Tries whether it is RAS.
+//   mandible open   The mandible is open by more than max_opening_deg (mandible.h).
+//   far off         A site is farther than max_misfit_mm from where the others predict it.
+//   mandible        All sites of the mandible are in the air. Only a note if none is given, none is
+//                   listed as absent and no bone is near.
+//   in the air      A site is farther than max_distance_mm from the bone.
+// With fewer than six standard sites only `same point` and `in the air` are checked.
 LandmarkMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
                                       const MeshQuery& query, const PlaceOptions& options);
 

@@ -11,7 +11,6 @@
 #include <optional>
 #include <string_view>
 
-#include "problems/subject/phantom_relief.h"
 #include "problems/subject/phantom_shape.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
@@ -21,11 +20,11 @@
 namespace semblance {
 namespace {
 
-// What an average head has at a landmark; of a pair, on the left.
+// Bone and tissue of an average head at a landmark; the left one of a pair.
 struct AverageLandmark {
   std::string_view code;  // Site::landmark
-  Vec3 near_bone;         // mm; a ray from the centre through it meets the landmark
-  double depth_mm;        // of an average adult
+  Vec3 near_bone;         // mm; the ray from the centre through it meets the landmark
+  double depth_mm;        // tissue depth of an average adult
 };
 
 const AverageLandmark kAverageHead[] = {
@@ -37,8 +36,8 @@ const AverageLandmark kAverageHead[] = {
     {"zy", {66, 58, -26}, 8},   {"sgl", {66, 82, -20}, 8.5}, {"go", {50, 70, -85}, 11.5},
     {"sM2", {37, 28, -62}, 15}, {"mr", {50, 56, -60}, 14},   {"iM2", {36, 32, -88}, 14},
 };
-constexpr double kVaultDepth = 5;     // mm
-constexpr double kBlendWidth = 0.27;  // sigma of a site's influence, radians
+constexpr double kVaultDepth_mm = 5;
+constexpr double kBlendWidth = 0.27;  // radians; a larger one blends the depths of sites more
 
 struct DirectionAnchor {
   Vec3 direction;
@@ -63,7 +62,7 @@ const AverageLandmark& AverageAt(const Site& site) {
   return *found;
 }
 
-Vec3 DirectionOf(const Site& site) {
+Vec3 SiteDirection(const Site& site) {
   const Vec3& left = AverageAt(site).near_bone;
   const double side = site.side == Side::kRight ? -1 : 1;
   return PhantomDirection({side * left.x(), left.y(), left.z()});
@@ -72,12 +71,13 @@ Vec3 DirectionOf(const Site& site) {
 std::vector<DirectionAnchor> SiteAnchors() {
   std::vector<DirectionAnchor> anchors;
   for (const Site& site : StandardSites()) {
-    anchors.push_back({DirectionOf(site), AverageAt(site).depth_mm});
+    anchors.push_back({SiteDirection(site), AverageAt(site).depth_mm});
   }
   return anchors;
 }
 
-// The vault is held at its depth by even points of the sphere that are far from every site.
+// Points spread evenly over the sphere (a Fibonacci lattice) and far from every site keep the vault
+// at its depth.
 std::vector<DirectionAnchor> VaultAnchors(const std::vector<DirectionAnchor>& sites) {
   constexpr int kPoints = 200;
   const double far = std::cos(35 * std::numbers::pi / 180);
@@ -89,7 +89,7 @@ std::vector<DirectionAnchor> VaultAnchors(const std::vector<DirectionAnchor>& si
     const Vec3 d(s * std::cos(azimuth), s * std::sin(azimuth), z);
     if (std::ranges::all_of(sites,
                             [&](const DirectionAnchor& a) { return a.direction.dot(d) < far; })) {
-      anchors.push_back({d, kVaultDepth});
+      anchors.push_back({d, kVaultDepth_mm});
     }
   }
   return anchors;
@@ -104,7 +104,7 @@ DepthFormula::DepthFormula(Random& random)
 }
 
 double DepthFormula::At(const Vec3& direction) const {
-  constexpr double kWaveShare = 0.05;
+  constexpr double kWaveShare = 0.05;  // random variation of depth; rms about 0.7 of it
   double sum = 0, weights = 0;
   for (const DirectionAnchor& a : anchors_) {
     const double weight = std::exp((a.direction.dot(direction) - 1) / (kBlendWidth * kBlendWidth));
@@ -114,10 +114,12 @@ double DepthFormula::At(const Vec3& direction) const {
   return subject_ * (1 + kWaveShare * waves_.Value(direction)) * sum / weights;
 }
 
-// Even directions: ring k of n has 6 min(k, n - k) of them, so triangles are alike everywhere.
+// Ring k of n has 6 min(k, n - k) directions, so that triangles have about the same size
+// everywhere.
 int RingSize(int ring, int rings) { return std::max(1, 6 * std::min(ring, rings - ring)); }
 
-// Runs 0..pi; rings lie closest at the height of the chin, where the bone curves most.
+// The polar angle, 0..pi, of the ring at `share`, 0..1. Rings are densest at the height of the
+// chin, where the bone curves most.
 double PolarAngle(double share) {
   constexpr double kCrowding = 0.25, kClosest = 0.74, kTurn = 2 * std::numbers::pi;
   const double wave = std::sin(kTurn * (share - kClosest)) + std::sin(kTurn * kClosest);
@@ -138,7 +140,8 @@ std::vector<Vec3> RingDirections(int rings) {
   return directions;
 }
 
-// Zips two rings: always the side whose next point comes first round the axis.
+// Joins two rings by triangles. Each step advances on the ring whose next point comes first round
+// the axis.
 void JoinRings(int upper_first, int upper_size, int lower_first, int lower_size,
                std::vector<Triangle>& triangles) {
   const int upper_steps = upper_size > 1 ? upper_size : 0;
@@ -181,7 +184,7 @@ class Head {
   double Thickness() const { return depth_.Thickness() * (relief_ ? relief_->Weight() : 1); }
   bool IsSmooth() const { return !relief_; }
 
-  // On the smooth bone, from which the skin is laid along the normals.
+  // The point on the smooth bone; the skin is laid from it along the normals.
   PhantomSite Smooth(std::string site, const Vec3& direction) const {
     return {std::move(site), centre_ + shape_.Radius(direction) * direction,
             shape_.Normal(direction), depth_.At(direction)};
@@ -189,8 +192,9 @@ class Head {
   Vec3 RoughBone(const Vec3& direction) const {
     return centre_ + RoughRadius(direction) * direction;
   }
-  // With the normal of the plane through points 3 mm away on four sides: who places a landmark
-  // looks at the bone around it.
+  // The point on the rough bone, with the normal of the plane through points 3 mm away on four
+  // sides, because a person who places a landmark looks at the bone around it. The depth is still
+  // NaN.
   PhantomSite Rough(std::string site, const Vec3& direction) const {
     const double step = 3 / RoughRadius(direction);
     const auto bone = [&](const Vec3& aside) {
@@ -218,21 +222,21 @@ class Head {
 std::vector<PhantomSite> SitesOn(const Head& head) {
   std::vector<PhantomSite> sites;
   for (const Site& site : StandardSites()) {
-    const Vec3 direction = DirectionOf(site);
+    const Vec3 direction = SiteDirection(site);
     sites.push_back(head.IsSmooth() ? head.Smooth(site.code, direction)
                                     : head.Rough(site.code, direction));
   }
   return sites;
 }
 
-// The depths of rough bone are how far its normals go to the skin.
+// Measures the depths of rough bone: the distance along each normal to the skin.
 void MeasureDepths(Phantom& phantom) {
   const MeshQuery skin(phantom.face);
   const auto depth_mm = [&](const Vec3& base, const Vec3& normal) {
-    constexpr double kReach_mm = 400;  // more than a head: a ray from inside leaves the skin
+    constexpr double kReach_mm = 400;  // longer than a head, so that every ray leaves the skin
     const std::optional<MeshPoint> hit = skin.FirstHit(base, normal, kReach_mm);
     if (!hit) {
-      throw InputError("phantom: the bone stands out of the skin; give it more rings");
+      throw InputError("phantom: the bone protrudes through the skin; give it more rings");
     }
     return hit->distance_mm;
   };
@@ -278,6 +282,20 @@ Phantom MakePhantom(const PhantomOptions& options) {
     MeasureDepths(phantom);
   }
   return phantom;
+}
+
+LandmarkFile PhantomLandmarks(const Phantom& phantom, std::uint64_t random_seed) {
+  LandmarkFile file;
+  file.subject = fmt::format("phantom {}", random_seed);
+  for (const PhantomSite& site : phantom.sites) {
+    Landmark landmark;
+    landmark.site = site.site;
+    landmark.MoveTo(site.base);
+    landmark.normal = {site.normal.x(), site.normal.y(), site.normal.z()};
+    landmark.depth_along_normal_mm = site.depth_mm;
+    file.landmarks.push_back(landmark);
+  }
+  return file;
 }
 
 }  // namespace semblance

@@ -4,8 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <iterator>
+#include <optional>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "problems/config/spelling_suggestion.h"
 
@@ -43,7 +47,7 @@ constexpr StandardLandmark kLandmarks[] = {
     {21, "iM2", "Sub M2", true},
 };
 
-// Names of the points on bone; definitions: Caple & Stephan 2016.
+// Names of the points on bone. Caple & Stephan (2016) define them.
 constexpr StandardLandmark kFurther[] = {
     {0, "op", "Opisthocranion", false},
     {0, "v", "Vertex", false},
@@ -75,15 +79,112 @@ const Site* FindLandmark(std::string_view landmark) {
   return at == AllSites().end() ? nullptr : &*at;
 }
 
-bool Stands(const std::vector<Site>& list, std::string_view site) {
+bool Contains(const std::vector<Site>& list, std::string_view site) {
   return std::ranges::find(list, site, &Site::code) != list.end();
 }
 
 std::string UnknownSite(std::string_view site, const std::vector<std::string>& codes) {
   const Site* const pair = FindLandmark(site);
   return pair != nullptr && std::ranges::find(codes, pair->code) != codes.end()
-             ? fmt::format("site '{0}' stands on both sides; write '{0}_l' or '{0}_r'", site)
+             ? fmt::format("site '{0}' is on both sides; write '{0}_l' or '{0}_r'", site)
              : fmt::format("unknown site '{}'{}", site, Suggestion(site, codes));
+}
+
+struct OtherName {
+  std::string_view name;  // in lower case, words separated by blanks
+  std::string_view landmark;
+};
+
+// Names besides the codes and the names as printed in the thesis. Names of points that lie
+// elsewhere on the bone (orbitale, subnasale, infradentale of the teeth) are left out on purpose.
+constexpr OtherName kOtherNames[] = {
+    {"rhinion", "rhi"},       {"end of nasal", "rhi"},     {"prosthion", "pr"},
+    {"upper lip", "pr"},      {"infradentale", "id"},      {"lower lip", "id"},
+    {"supramentale", "sm"},   {"chin lip", "sm"},          {"pogonion", "pg"},
+    {"menton", "me"},         {"midphiltrum", "mp"},       {"mid supraorbital", "mso"},
+    {"supraorbitale", "mso"}, {"mid infraorbital", "mio"}, {"infraorbital", "mio"},
+    {"zygion", "zy"},         {"zygomatic arch", "zy"},    {"supra m 2", "sM2"},
+    {"sub m 2", "iM2"},       {"infra m2", "iM2"},         {"mid ramus", "mr"},
+};
+
+// Splits a name into words of letters and digits, in lower case.
+std::vector<std::string> SplitWords(std::string_view name) {
+  std::vector<std::string> words(1);
+  for (const char c : name) {
+    const auto byte = static_cast<unsigned char>(c);
+    if (std::isalnum(byte) != 0) {
+      words.back() += static_cast<char>(std::tolower(byte));
+    } else if (!words.back().empty()) {
+      words.emplace_back();
+    }
+  }
+  if (words.back().empty()) {
+    words.pop_back();
+  }
+  return words;
+}
+
+std::optional<Side> ParseSide(std::string_view word) {
+  if (word == "l" || word == "left") {
+    return Side::kLeft;
+  }
+  if (word == "r" || word == "right") {
+    return Side::kRight;
+  }
+  return std::nullopt;
+}
+
+// Removes the side from the words: at the beginning, at the end, or after a number ("18r").
+Side RemoveSide(std::vector<std::string>& words) {
+  if (words.size() > 1) {
+    if (const auto side = ParseSide(words.back())) {
+      words.pop_back();
+      return *side;
+    }
+    if (const auto side = ParseSide(words.front())) {
+      words.erase(words.begin());
+      return *side;
+    }
+  }
+  std::string& last = words.back();
+  const auto side = ParseSide(std::string_view(last).substr(last.size() - 1));
+  const bool after_number =
+      last.size() > 1 && std::all_of(last.begin(), last.end() - 1, [](char c) {
+        return std::isdigit(static_cast<unsigned char>(c)) != 0;
+      });
+  if (side && after_number) {
+    last.pop_back();
+    return *side;
+  }
+  return Side::kMidline;
+}
+
+std::string Joined(const std::vector<std::string>& words) {
+  return fmt::format("{}", fmt::join(words, " "));
+}
+
+bool IsNamed(const Site& site, const std::string& name) {
+  if (name == Joined(SplitWords(site.landmark)) || name == Joined(SplitWords(site.name)) ||
+      (site.number > 0 && name == std::to_string(site.number))) {
+    return true;
+  }
+  return std::any_of(std::begin(kOtherNames), std::end(kOtherNames), [&](const OtherName& other) {
+    return other.landmark == site.landmark && other.name == name;
+  });
+}
+
+NamedSite UnknownName(std::string_view name) {
+  std::vector<std::string> known;
+  for (const Site& site : AllSites()) {
+    known.push_back(site.code);
+    known.emplace_back(site.name);
+  }
+  const std::string near = NearestWord(name, known);
+  return {
+      .code = "",
+      .fault = fmt::format("'{}' is not a site{}; use a code such as g or go_l, a number of the "
+                           "thesis (1 to 21, with l or r) or a name such as 'left gonion'",
+                           name, near.empty() ? "" : fmt::format("; did you mean '{}'?", near))};
 }
 
 }  // namespace
@@ -117,8 +218,9 @@ std::string MirrorOf(std::string_view code) {
   return site == nullptr ? "" : site->mirror;
 }
 
-bool IsStandardSite(std::string_view site) { return Stands(StandardSites(), site); }
-bool IsFurtherSite(std::string_view site) { return Stands(FurtherSites(), site); }
+bool IsStandardSite(std::string_view site) { return Contains(StandardSites(), site); }
+bool IsFurtherSite(std::string_view site) { return Contains(FurtherSites(), site); }
+bool IsSite(std::string_view name) { return FindSite(name) != nullptr; }
 
 std::vector<std::string> StandardSiteCodes() {
   std::vector<std::string> codes;
@@ -136,12 +238,50 @@ std::string ComplaintAboutSite(std::string_view site) {
 }
 
 std::string ComplaintAboutLandmark(std::string_view site) {
-  if (IsStandardSite(site) || IsFurtherSite(site)) {
+  if (IsSite(site)) {
     return "";
   }
   std::vector<std::string> codes = StandardSiteCodes();
   std::ranges::transform(FurtherSites(), std::back_inserter(codes), &Site::code);
   return UnknownSite(site, codes);
+}
+
+NamedSite FindSiteByName(std::string_view name) {
+  std::vector<std::string> words = SplitWords(name);
+  if (words.empty()) {
+    return UnknownName(name);
+  }
+  const Side side = RemoveSide(words);
+  const std::string landmark = Joined(words);
+  std::optional<Site> named;
+  for (const Site& site : AllSites()) {
+    if (IsNamed(site, landmark)) {
+      named = site;
+      if (site.side == side) {
+        return {.code = site.code, .fault = ""};
+      }
+    }
+  }
+  if (!named) {
+    return UnknownName(name);
+  }
+  return {
+      .code = "",
+      .fault = side == Side::kMidline
+                   ? fmt::format("'{0}' is on both sides; state the side, as '{1}_l' or '{1}_r'",
+                                 name, named->landmark)
+                   : fmt::format("'{}' has a side, and {} lies in the midline; write '{}'", name,
+                                 SiteInWords(named->code), named->code)};
+}
+
+std::vector<std::string> OtherSiteNames(std::string_view landmark) {
+  std::vector<std::string> names;
+  for (const OtherName& other : kOtherNames) {
+    if (other.landmark == landmark) {
+      names.emplace_back(other.name);
+    }
+  }
+  return names;
 }
 
 }  // namespace semblance

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The sites of the skull: the standard ones (thesis app. A), and those that other tables have
-// beside them. What a phantom or a generic face has there stands with these, keyed by the codes.
+// The sites of the skull: the standard sites (thesis app. A) and the further sites of other tables.
+// People may name a site by its code, its number in the thesis or a plain name.
 #pragma once
 
 #include <string>
@@ -13,43 +13,61 @@ namespace semblance {
 
 struct Site {
   std::string code;       // with side, e.g. "g", "go_l"
-  std::string landmark;   // the code without side, "go": what tables of depth name
-  int number;             // of the landmark in the thesis's tables, 1 ... 21; 0: not there
-  std::string_view name;  // of the landmark as printed there, e.g. "Gonion"
+  std::string landmark;   // the code without side, "go", by which depth tables name it
+  int number;             // of the landmark in the thesis's tables, 1 ... 21; 0: none
+  std::string_view name;  // name of the landmark as printed there, e.g. "Gonion"
   Side side;
-  std::string mirror;  // the code of the site on the other side; its own in the midline
+  std::string mirror;  // code of the site on the other side; in the midline its own code
 };
 
-// All 32 in the order of the thesis's tables: 10 in the midline, then 11 pairs, left before right.
+// All 32 standard sites in the order of the thesis's tables: 10 in the midline, then 11 pairs, left
+// before right.
 const std::vector<Site>& StandardSites();
 
-// Their codes in that order.
+// The codes of the standard sites in that order.
 std::vector<std::string> StandardSiteCodes();
 
-// The 13 of published tables that the network lacks, e.g. "mmb_l" (Caple & Stephan 2016): 5 in the
-// midline, then 4 pairs. A landmark may stand at one, and its table gives the depth; the generic
-// face and the average skull have none.
+// The 13 sites of published tables that the standard network lacks, e.g. "mmb_l" (Caple & Stephan
+// 2016): 5 in the midline, then 4 pairs. A landmark may be placed at one of them and gets the depth
+// of such a table. The generic face and the average skull do not have these sites.
 const std::vector<Site>& FurtherSites();
 
-// The standard ones, then the further ones.
+// The standard sites, then the further sites.
 const std::vector<Site>& AllSites();
 
-// Of all; null for a code that is none of theirs.
+// Finds the site among all sites; null if no site has the code.
 const Site* FindSite(std::string_view code);
 
-// The code of the site on the other side, of all sites; "" for a code that is none of theirs.
+// The code of the site on the other side; empty if no site has the code.
 std::string MirrorOf(std::string_view code);
 
 bool IsStandardSite(std::string_view site);
 bool IsFurtherSite(std::string_view site);
+bool IsSite(std::string_view name);  // standard or further
 
-// "go_l (Gonion)", also of "go"; the code alone where the site is in neither list.
+// "go_l (Gonion)"; a code without side also works. The code alone if the site is in neither list.
 std::string SiteInWords(std::string_view site);
 
-// "" if `site` is one of StandardSiteCodes(), else what is wrong with it and what to do.
+// Empty if `site` is a standard site; otherwise the fault and the remedy.
 std::string ComplaintAboutSite(std::string_view site);
 
-// The same where a further site may stand too: in landmarks' files and depths by site.
+// The same where a further site is allowed too: in landmark files and depths by site.
 std::string ComplaintAboutLandmark(std::string_view site);
+
+// The site that a name means.
+struct NamedSite {
+  std::string code;   // standard or further; empty if the name is not understood
+  std::string fault;  // the fault and the remedy in that case; otherwise empty
+};
+
+// Finds the standard or further site that a name means. Upper and lower case, blanks, '_', '-', '.'
+// and parentheses make no difference. The landmark is a code ("go"), its number in the thesis (18)
+// or a name ("gonion", "end of nasals", "rhinion"). The side is l, r, left or right, before or
+// after the landmark ("left gonion", "Gonion (L)", "go_L", "18r"). A landmark in the midline takes
+// no side; a landmark of a pair needs one.
+NamedSite FindSiteByName(std::string_view name);
+
+// Further names of a landmark ("go"), besides its code, number and printed name.
+std::vector<std::string> OtherSiteNames(std::string_view landmark);
 
 }  // namespace semblance

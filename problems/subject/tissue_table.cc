@@ -28,7 +28,7 @@ std::vector<std::string> SixStrata() {
   return strata;
 }
 
-std::vector<std::string> StrataOf(const TissueRow& row) {
+std::vector<std::string> ListStrata(const TissueRow& row) {
   std::vector<std::string> strata;
   for (const auto& [stratum, cell] : row.values) {
     strata.push_back(stratum);
@@ -40,7 +40,7 @@ bool IsPooled(const TissueTable& table) {
   return !table.rows.empty() && table.rows.front().values.contains(kPooled);
 }
 
-std::string StratumOf(const TissueTable& table, Sex sex, Build build) {
+std::string FindStratum(const TissueTable& table, Sex sex, Build build) {
   return IsPooled(table) ? kPooled : StratumName(sex, build);
 }
 
@@ -65,7 +65,7 @@ std::string WhyNoDepth(const TissueCell* cell) {
   return cell->note.empty() ? "missing" : fmt::format("missing: {}", cell->note);
 }
 
-// The row's depths by build, lightest first, as far as they are known.
+// The row's known depths by build, lightest build first.
 std::vector<double> MeansByBuild(const TissueRow& row, Sex sex) {
   std::vector<double> means;
   for (const Build build : {Build::kEmaciated, Build::kNormal, Build::kObese}) {
@@ -82,25 +82,26 @@ bool GrowsWithBuild(const TissueRow& row, Sex sex) {
   return std::is_sorted(means.begin(), means.end());
 }
 
-// "" if the row's depths grow with the build in both sexes.
-std::string BrokenOrder(const TissueRow& row) {
-  std::string broken;
+// Empty if the row's depths grow with the build in both sexes; otherwise the depths of each sex in
+// which they do not.
+std::string DescribeDisorder(const TissueRow& row) {
+  std::string text;
   for (const Sex sex : {Sex::kMale, Sex::kFemale}) {
     if (!GrowsWithBuild(row, sex)) {
-      broken += fmt::format("{} {} {:.2f} mm", broken.empty() ? "" : ",",
-                            sex == Sex::kMale ? "male" : "female",
-                            fmt::join(MeansByBuild(row, sex), " "));
+      text += fmt::format("{} {} {:.2f} mm", text.empty() ? "" : ",",
+                          sex == Sex::kMale ? "male" : "female",
+                          fmt::join(MeansByBuild(row, sex), " "));
     }
   }
-  return broken;
+  return text;
 }
 
-bool IsCovariateOf(const TissueCorrelations& o, const std::string& name) {
+bool IsCovariate(const TissueCorrelations& o, const std::string& name) {
   return std::ranges::find(o.covariates, name, &TissueCovariate::name) != o.covariates.end();
 }
 
-// "" if the rows are a lower triangle of numbers within -1 .. 1.
-std::string ComplaintAboutRows(const TissueCorrelations& o) {
+// The fault of the rows; empty if they are a lower triangle of numbers between -1 and 1.
+std::string RowsFault(const TissueCorrelations& o) {
   if (o.rows.size() != o.names.size()) {
     return fmt::format("{} rows for {} names; write one per name", o.rows.size(), o.names.size());
   }
@@ -127,8 +128,8 @@ bool IsPositiveDefinite(const TissueCorrelations& o) {
   return matrix.llt().info() == Eigen::Success;
 }
 
-// "" if every stratum of the site's row has an sd.
-std::string ComplaintAboutSpread(const TissueTable& table, const std::string& site) {
+// The fault of a site among the correlations; empty if every stratum of its row has an sd.
+std::string SpreadFault(const TissueTable& table, const std::string& site) {
   const auto row = std::ranges::find(table.rows, WithoutSide(site), &TissueRow::site);
   if (row == table.rows.end()) {
     return fmt::format("'{}' is not in the table", site);
@@ -150,8 +151,8 @@ void CheckValue(Report& report, const TissueCorrelations& o) {
     if (!seen.insert(name).second) {
       report("names", fmt::format("'{}' appears twice; keep one", name));
     }
-    if (!IsCovariateOf(o, name) && !ComplaintAboutLandmark(name).empty()) {
-      report("names", fmt::format("{}; or is it a covariate that `covariates` lacks?",
+    if (!IsCovariate(o, name) && !ComplaintAboutLandmark(name).empty()) {
+      report("names", fmt::format("{}; or is it a covariate that is missing from `covariates`?",
                                   ComplaintAboutLandmark(name)));
     }
   }
@@ -163,10 +164,10 @@ void CheckValue(Report& report, const TissueCorrelations& o) {
                                        fmt::join(known, ", ")));
     }
   }
-  if (const std::string complaint = ComplaintAboutRows(o); !complaint.empty()) {
+  if (const std::string complaint = RowsFault(o); !complaint.empty()) {
     report("rows", complaint);
   } else if (!IsPositiveDefinite(o)) {
-    report("rows", "no depths can correlate so: the matrix is not positive definite");
+    report("rows", "the matrix is not positive definite, so no depths can have these correlations");
   }
 }
 
@@ -185,13 +186,13 @@ template <class Report>
 void CheckValue(Report& report, const TissueRow& row) {
   std::vector<std::string> six = SixStrata();
   std::sort(six.begin(), six.end());
-  const std::vector<std::string> strata = StrataOf(row);
+  const std::vector<std::string> strata = ListStrata(row);
   if (strata != six && strata != std::vector<std::string>{kPooled}) {
     report("values", fmt::format("the strata must be all of {}, or only {}",
                                  fmt::join(SixStrata(), ", "), kPooled));
   }
   if (row.site.empty() || WithoutSide(row.site) != row.site) {
-    report("site", fmt::format("'{}' is not a code without side; a pair stands once", row.site));
+    report("site", fmt::format("'{}' is not a code without side; list a pair once", row.site));
   }
 }
 
@@ -205,24 +206,24 @@ void CheckValue(Report& report, const TissueTable& table) {
     report("id", "give the table a short name; messages use it");
   }
   if (table.rows.empty()) {
-    report("rows", "the table has none; list at least one site");
+    report("rows", "the list is empty; list at least one site");
   }
   std::set<std::string> sites;
   for (const TissueRow& row : table.rows) {
     if (!sites.insert(row.site).second) {
       report("rows", fmt::format("site '{}' appears twice; keep one", row.site));
     }
-    if (StrataOf(row) != StrataOf(table.rows.front())) {
-      report("rows", fmt::format("site '{}' has other strata than the first row; a table is either "
-                                 "pooled or not",
-                                 row.site));
+    if (ListStrata(row) != ListStrata(table.rows.front())) {
+      report("rows",
+             fmt::format("site '{}' has other strata than the first row; give all rows the same "
+                         "strata",
+                         row.site));
     }
   }
   for (const std::string& name :
        table.correlations ? table.correlations->names : std::vector<std::string>()) {
-    const std::string complaint = IsCovariateOf(*table.correlations, name)
-                                      ? std::string()
-                                      : ComplaintAboutSpread(table, name);
+    const std::string complaint =
+        IsCovariate(*table.correlations, name) ? std::string() : SpreadFault(table, name);
     if (!complaint.empty()) {
       report("correlations", complaint);
     }
@@ -231,8 +232,8 @@ void CheckValue(Report& report, const TissueTable& table) {
 
 std::vector<std::string> CovariateNames() { return {"sex", "build", "age_years", "bmi"}; }
 
-double CovariateOf(Sex sex) { return sex == Sex::kMale ? 1 : 0; }
-double CovariateOf(Build build) { return static_cast<int>(build) - 1; }
+double CovariateValue(Sex sex) { return sex == Sex::kMale ? 1 : 0; }
+double CovariateValue(Build build) { return static_cast<int>(build) - 1; }
 
 std::string StratumName(Sex sex, Build build) {
   return fmt::format("{}_{}", EnumNames(build)[static_cast<std::size_t>(build)],
@@ -245,7 +246,7 @@ TissueTable ReadTissueTable(const std::filesystem::path& path) {
 
 std::optional<TissueDepth> FindDepth(const TissueTable& table, Sex sex, Build build,
                                      const std::string& site) {
-  const TissueCell* const cell = FindCell(table, StratumOf(table, sex, build), site);
+  const TissueCell* const cell = FindCell(table, FindStratum(table, sex, build), site);
   if (!HasDepth(cell)) {
     return std::nullopt;
   }
@@ -253,7 +254,7 @@ std::optional<TissueDepth> FindDepth(const TissueTable& table, Sex sex, Build bu
 }
 
 std::string WhyNoDepth(const TissueTable& table, Sex sex, Build build, const std::string& site) {
-  return WhyNoDepth(FindCell(table, StratumOf(table, sex, build), site));
+  return WhyNoDepth(FindCell(table, FindStratum(table, sex, build), site));
 }
 
 std::vector<std::string> UnorderedLandmarks(const TissueTable& table, Sex sex,
@@ -272,10 +273,10 @@ std::vector<std::string> UnorderedLandmarks(const TissueTable& table, Sex sex,
 std::vector<std::string> TableWarnings(const TissueTable& table) {
   std::vector<std::string> warnings;
   for (const TissueRow& row : table.rows) {
-    if (const std::string broken = BrokenOrder(row); !broken.empty()) {
+    if (const std::string disorder = DescribeDisorder(row); !disorder.empty()) {
       warnings.push_back(
           fmt::format("tissue table '{}', {}: depth does not grow from emaciated to obese:{}",
-                      table.id, SiteInWords(row.site), broken));
+                      table.id, SiteInWords(row.site), disorder));
     }
     for (const auto& [stratum, cell] : row.values) {
       if (cell.flag == CellFlag::kSuspect) {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/subject/landmarks.h"
+#include "problems/subject/dowel_placement.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {

@@ -8,8 +8,8 @@
 
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/output/files.h"
-#include "problems/phantom/phantom_landmarks.h"
 #include "problems/pipeline/experiment_config.h"
+#include "problems/subject/phantom.h"
 #include "problems/view/view_mesh.h"
 #include "problems/volumes/read_volume.h"
 #include "problems/workbench/bench_actions.h"

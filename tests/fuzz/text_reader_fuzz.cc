@@ -10,10 +10,9 @@
 #include <vector>
 
 #include "problems/config/value_filter.h"
-#include "problems/landmark_files/fcsv.h"
 #include "problems/landmark_files/landmark_table.h"
 #include "problems/landmark_files/markups_json.h"
-#include "problems/landmark_files/picked_points.h"
+#include "problems/landmark_files/point_files.h"
 #include "problems/points/point_table.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/npy.h"

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -17,6 +18,38 @@
 
 namespace semblance {
 namespace {
+
+std::vector<std::string> AllSites() {
+  std::vector<std::string> sites = StandardSiteCodes();
+  for (const Site& site : FurtherSites()) {
+    sites.push_back(site.code);
+  }
+  sites.emplace_back("bmi");
+  return sites;
+}
+
+double Least(const Eigen::MatrixXd& matrix) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(matrix).eigenvalues().minCoeff();
+}
+
+// Each part of the model is a kernel, so the least eigenvalue is at least the part `own`.
+TEST(ModelledCorrelation, IsPositiveDefiniteForAllSites) {
+  for (const SiteCorrelation& o :
+       {SiteCorrelation{}, SiteCorrelation{.common = 0, .twins = 0.99, .own = 0.01},
+        SiteCorrelation{.common = 0.9, .twins = 0, .own = 0.01, .length_mm = 500}}) {
+    EXPECT_GE(Least(ModelledCorrelation(o, AllSites())), o.own - 1e-9);
+  }
+}
+
+TEST(ModelledCorrelation, IsHighestForTwinsAndNeighbours) {
+  const std::vector<std::string> sites = {"zy_l", "zy_r", "lo_l", "me", "bmi"};
+  const Eigen::MatrixXd r = ModelledCorrelation({}, sites);
+  EXPECT_GT(r(0, 1), r(0, 3));
+  EXPECT_GT(r(0, 2), r(0, 3));
+  EXPECT_GT(r(0, 2), r(1, 2));
+  EXPECT_EQ(r(0, 4), 0);
+  EXPECT_TRUE(r.diagonal().isOnes());
+}
 
 using ::testing::Contains;
 using ::testing::HasSubstr;
@@ -57,14 +90,14 @@ const Dowel& At(const Filled& filled, const std::string& site) {
   return *std::ranges::find(filled.dowels, site, &Dowel::site);
 }
 
-TEST(ConditionDepths, DoesNothingWhereNothingIsGiven) {
+TEST(ConditionDepths, DoesNothingIfNothingIsGiven) {
   const Filled plain = Fill(FromTTable());
   EXPECT_EQ(At(plain, "g").depth_mm, 5.5);
   EXPECT_EQ(At(plain, "g").sd_mm, 1);
   EXPECT_TRUE(plain.notes.empty());
 }
 
-TEST(ConditionDepths, HonoursAKnownDepthAndTellsTheOthersOfIt) {
+TEST(ConditionDepths, KeepsAKnownDepthAndMovesTheOthers) {
   TissueOptions options = FromTTable();
   options.given.depths_mm = {{"go_l", 20.0}};
   const Filled given = Fill(options), plain = Fill(FromTTable());
@@ -80,7 +113,7 @@ TEST(ConditionDepths, HonoursAKnownDepthAndTellsTheOthersOfIt) {
   EXPECT_THAT(given.notes, Contains(HasSubstr("go_l 20")));
 }
 
-TEST(ConditionDepths, APairsCodeMeansBothSidesAndAnErrorLeavesRoom) {
+TEST(ConditionDepths, APairsCodeMeansBothSidesAndAnErrorLoosensTheDepth) {
   TissueOptions options = FromTTable();
   options.given.depths_mm = {{"zy", 12.0}};
   options.given.error_mm = 1;
@@ -92,7 +125,7 @@ TEST(ConditionDepths, APairsCodeMeansBothSidesAndAnErrorLeavesRoom) {
   EXPECT_LT(At(given, "zy_l").sd_mm, 1);
 }
 
-TEST(ConditionDepths, AKnownDepthIsHonouredWhereTheTableLacksTheSite) {
+TEST(ConditionDepths, AKnownDepthIsUsedIfTheTableLacksTheSite) {
   TissueOptions options = FromTTable();
   options.given.depths_mm = {{"fe", 4.0}, {"g", 6.0}};
   options.given.error_mm = 0.3;
@@ -105,7 +138,7 @@ TEST(ConditionDepths, AKnownDepthIsHonouredWhereTheTableLacksTheSite) {
     EXPECT_EQ(dowels[k].sd_mm, 0.3) << dowels[k].site;
   }
   EXPECT_THAT(on_depths, Contains(HasSubstr("fe_l (Frontal Eminence): no table has a depth; the "
-                                            "known one of 4 mm is taken")));
+                                            "known depth of 4 mm is used")));
   EXPECT_THAT(on_depths, Contains(HasSubstr("dowel left out")).Times(1));
   EXPECT_THAT(on_known, Contains(HasSubstr("fe_l, fe_r tells nothing of the others")));
 }
@@ -125,7 +158,7 @@ TEST(ConditionDepths, MeasuredDepthsComeFromTheLandmarks) {
   EXPECT_GT(At(given, "n").depth_mm, 6);
   options.given.measured = {"n"};
   EXPECT_THAT(WordsOf<InputError>([&] { Fill(options, file); }),
-              HasSubstr("no measured depth in the landmarks' file"));
+              HasSubstr("no measured depth in the landmark file"));
 }
 
 TEST(ConditionDepths, ATableWithoutDeviationsNeedsAnother) {
@@ -155,7 +188,7 @@ correlations:
   rows: [[], [0.5], [0.3, 0.8]]
 )";
 
-TEST(ConditionDepths, TakesAPopulationsCorrelations) {
+TEST(ConditionDepths, UsesAPopulationsCorrelations) {
   TissueOptions options;
   options.table = ScratchFile(kPopulation);
   options.given.bmi = 29;
@@ -170,7 +203,7 @@ TEST(ConditionDepths, TakesAPopulationsCorrelations) {
               HasSubstr("age_years"));
 }
 
-TEST(ConditionDepths, SaysWhatLiesFarFromAllSubjects) {
+TEST(ConditionDepths, NotesValuesFarFromAllSubjects) {
   TissueOptions options;
   options.table = ScratchFile(kPopulation);
   std::vector<Dowel> dowels = Dowels({"g", "pg"});
@@ -180,7 +213,7 @@ TEST(ConditionDepths, SaysWhatLiesFarFromAllSubjects) {
   EXPECT_THAT(
       ConditionDepths(options, {}, dowels),
       Contains(HasSubstr("tissue.given: bmi 99 is 18 standard deviations from the table's 25 "
-                         "± 4, so the depths given it are extrapolated")));
+                         "± 4, so the conditioned depths are extrapolated")));
   options.given.bmi.reset();
   options.given.depths_mm = {{"g", 12.0}};
   EXPECT_THAT(ConditionDepths(options, {}, dowels), Contains(HasSubstr("g 12 is 6 standard")));
@@ -188,8 +221,8 @@ TEST(ConditionDepths, SaysWhatLiesFarFromAllSubjects) {
   EXPECT_THAT(ConditionDepths(options, {}, dowels), Not(Contains(HasSubstr("extrapolated"))));
 }
 
-// What a table states of its people goes on as it is: nothing is given of this one.
-TEST(ConditionDepths, AFewSubjectsWidenOnlyWhatIsGiven) {
+// Without given facts, the deviations of the table stay unchanged.
+TEST(ConditionDepths, FewSubjectsWidenOnlyConditionedDepths) {
   std::string text = kPopulation;
   text.replace(text.find("subjects: 0"), 11, "subjects: 6");
   for (std::size_t at = 0; (at = text.find("n: 50")) != text.npos;) {
@@ -203,7 +236,7 @@ TEST(ConditionDepths, AFewSubjectsWidenOnlyWhatIsGiven) {
   EXPECT_NEAR(At(Fill(options), "g").sd_mm, std::sqrt(1 + 1 / 6.) * 2.015 / 1.645, 0.01);
 }
 
-TEST(TissueCorrelations, ThatNoDepthsCanHaveAreRefused) {
+TEST(TissueCorrelations, ImpossibleOnesAreRefused) {
   std::string text = kPopulation;
   text.replace(text.find("[0.3, 0.8]"), 10, "[-0.9, 0.8]");
   EXPECT_THAT(WordsOf<ConfigError>([&] { ReadTissueTable(ScratchFile(text)); }),
@@ -221,8 +254,8 @@ TEST(TissueGiven, IsForTables) {
               HasSubstr("given"));
 }
 
-// What is given goes all the way into the interpolated field and its stated deviation.
-TEST(ConditionDepths, GoesOnIntoTheCase) {
+// Given facts reach the interpolated field and its stated deviation.
+TEST(ConditionDepths, ReachesTheCase) {
   const std::string text = fmt::format(
       "{{subject: {{type: phantom, rings: 16}}, network: '{}/configs/networks/standard32.yaml', "
       "tissue: {{table: '{}', given: {{measured: [g, go, zy, pg]}}}}}}",
@@ -240,8 +273,9 @@ TEST(ConditionDepths, GoesOnIntoTheCase) {
       EXPECT_GT(dowel.sd_mm, 0.3) << dowel.site;
     }
   }
-  EXPECT_THAT(subject.notes, Contains(HasSubstr("those to be expected given")));
+  EXPECT_THAT(subject.notes, Contains(HasSubstr("those expected given")));
 }
 
 }  // namespace
+
 }  // namespace semblance

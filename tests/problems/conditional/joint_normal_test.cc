@@ -9,10 +9,10 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <tuple>
 
-#include "problems/conditional/fit_joint_normal.h"
-#include "problems/conditional/site_correlation.h"
+#include "problems/conditional/condition_depths.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
@@ -25,7 +25,7 @@ using Eigen::Index;
 using ::testing::HasSubstr;
 using testing::WordsOf;
 
-// The 32 sites, thick where the model says, as a population would have them.
+// A distribution of the 32 sites with the correlations of the model.
 JointNormal Sites(int sample = 0) {
   JointNormal joint{
       .names = StandardSiteCodes(), .mean = {}, .sd = {}, .correlation = {}, .sample = {}};
@@ -37,7 +37,7 @@ JointNormal Sites(int sample = 0) {
   return joint;
 }
 
-// People of the distribution, a row each.
+// People drawn from the distribution, a row each.
 Eigen::MatrixXd Draw(const JointNormal& joint, int count, Random& random) {
   const Eigen::MatrixXd s = joint.sd.asDiagonal() * joint.correlation * joint.sd.asDiagonal();
   const Eigen::MatrixXd root = s.llt().matrixL();
@@ -52,7 +52,7 @@ Eigen::MatrixXd Draw(const JointNormal& joint, int count, Random& random) {
   return people;
 }
 
-TEST(Condition, HonoursWhatIsKnown) {
+TEST(Condition, KeepsKnownNumbers) {
   const JointNormal joint = Sites();
   const std::vector<KnownValue> known = {{"g", 7.25}, {"go_l", 11.5}, {"pg", 6}};
   const ConditionalNormal given = Condition(joint, known);
@@ -69,8 +69,9 @@ TEST(Condition, WithNothingKnownIsTheDistribution) {
   EXPECT_TRUE(given.sd.isApprox(joint.sd));
 }
 
-// The oracle: blocks of the precision matrix, by a general inverse of the whole covariance.
-TEST(Condition, IsThatOfThePrecisionMatrix) {
+// The reference solution uses blocks of the precision matrix, the general inverse of the whole
+// covariance.
+TEST(Condition, AgreesWithThePrecisionMatrix) {
   const JointNormal joint = Sites();
   const std::vector<KnownValue> known = {{"zy_l", 9}, {"n", 5}, {"mr_r", 21}};
   const ConditionalNormal given = Condition(joint, known);
@@ -95,8 +96,9 @@ TEST(Condition, IsThatOfThePrecisionMatrix) {
   }
 }
 
-// An error as large as the world tells nothing; a small one hardly less than none.
-TEST(Condition, ErrorsOfWhatIsKnownCount) {
+// A number with a huge error carries no information; one with a small error nearly as much as an
+// exact one.
+TEST(Condition, ErrorsOfKnownNumbersCount) {
   const JointNormal joint = Sites();
   const int at = *joint.Find("mso_l");
   const std::vector<KnownValue> exact = {{"mso_r", 20}}, unsure = {{"mso_r", 20, 1e6}},
@@ -106,7 +108,7 @@ TEST(Condition, ErrorsOfWhatIsKnownCount) {
   EXPECT_GT(std::abs(Condition(joint, exact).mean[at] - joint.mean[at]), 1);
 }
 
-// What so many people of another world tell, with the rest from the model.
+// The distribution estimated from that many people of another distribution and the model.
 JointNormal Population(int people) {
   JointNormal truth = Sites();
   truth.correlation =
@@ -125,8 +127,7 @@ std::vector<KnownValue> AtTheirMeans(const JointNormal& joint,
   return known;
 }
 
-// Whether none, few or many people are behind a distribution, and whether some sites are known or
-// all.
+// The parameters: none, few or many people behind a distribution; some or all sites known.
 class KnownWithErrors : public ::testing::TestWithParam<std::tuple<int, bool>> {
  protected:
   const int people_ = std::get<0>(GetParam());
@@ -141,7 +142,7 @@ class KnownWithErrors : public ::testing::TestWithParam<std::tuple<int, bool>> {
   }
 };
 
-TEST_P(KnownWithErrors, AreAtLeastAsSureAsTheirErrorAndTheLessTheLargerItIs) {
+TEST_P(KnownWithErrors, AreAtLeastAsCertainAsTheirErrorAndLessWithALargerOne) {
   Eigen::VectorXd last = Given(0).sd;
   for (const double error_mm : errors_mm_) {
     const Eigen::VectorXd sd = Given(error_mm).sd;
@@ -153,9 +154,9 @@ TEST_P(KnownWithErrors, AreAtLeastAsSureAsTheirErrorAndTheLessTheLargerItIs) {
   }
 }
 
-// A sample of six that is asked for less tells a tenth surer what it tells, one of forty a
-// hundredth.
-TEST_P(KnownWithErrors, TellTheOthersLessTheLargerTheErrorIs) {
+// With fewer effective regressors, the deviations from a sample of six shrink by up to a tenth,
+// those from a sample of forty by up to a hundredth.
+TEST_P(KnownWithErrors, InformTheOthersLessWithALargerError) {
   const double least = people_ == 6 ? 0.9 : people_ == 40 ? 0.99 : 1 - 1e-9;
   Eigen::VectorXd last = Given(0).sd;
   for (const double error_mm : errors_mm_) {
@@ -165,7 +166,7 @@ TEST_P(KnownWithErrors, TellTheOthersLessTheLargerTheErrorIs) {
   }
 }
 
-TEST_P(KnownWithErrors, AreAsNothingKnownWhereTheErrorIsHuge) {
+TEST_P(KnownWithErrors, WithAHugeErrorAreAsUnknown) {
   const ConditionalNormal nothing = Condition(joint_, {}), given = Given(1e6);
   EXPECT_LT((given.sd - nothing.sd).cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_LT((given.mean - nothing.mean).cwiseAbs().maxCoeff(), 1e-6);
@@ -176,9 +177,9 @@ INSTANTIATE_TEST_SUITE_P(People, KnownWithErrors,
                                            std::tuple(6, false), std::tuple(40, false),
                                            std::tuple(40, true)));
 
-// Where a sample is asked for more than it has subjects, its forecasts are as wide as they are
-// wild; but a measurement stays as sure as it is, and one that tells nothing costs nothing.
-TEST(Condition, SixPeopleAreNotMadeLessSureByWhatTellsNothing) {
+// With more regressors than subjects the predictions are erratic and their deviations wide. A known
+// number keeps its own certainty, and a number without information does not widen the others.
+TEST(Condition, NumbersWithoutInformationDoNotWidenASmallSample) {
   const JointNormal joint = Population(6);
   const ConditionalNormal nothing = Condition(joint, {});
   for (const double error_mm : {0.05, 0.5, 5.0}) {
@@ -189,8 +190,8 @@ TEST(Condition, SixPeopleAreNotMadeLessSureByWhatTellsNothing) {
   EXPECT_LT((given.sd - nothing.sd).cwiseAbs().maxCoeff(), 1e-6);
 }
 
-// Thirty known numbers are not thirty for a sample of forty of which a part is the model's.
-TEST(Condition, CountsWhatTheSampleWasAskedFor) {
+// Thirty known numbers count as fewer regressors if a part of the correlations is the model's.
+TEST(Condition, CountsEffectiveRegressors) {
   const JointNormal joint = Population(40);
   JointNormal exact = joint;
   exact.sample.assign(exact.sample.size(), 0);
@@ -203,7 +204,7 @@ TEST(Condition, CountsWhatTheSampleWasAskedFor) {
   EXPECT_LT(widening, 2);
 }
 
-// random: of the errors of what is known, in standard deviations; null: none.
+// `random` draws the errors of the known numbers, in standard deviations; null means no errors.
 double ShareWithin(const JointNormal& joint, const Eigen::MatrixXd& people,
                    const std::vector<std::string>& names, long& counted, double errors = 0,
                    Random* random = nullptr) {
@@ -226,7 +227,7 @@ double ShareWithin(const JointNormal& joint, const Eigen::MatrixXd& people,
   return within;
 }
 
-TEST(Condition, NinetyPercentHoldWhereTheCovarianceIsKnown) {
+TEST(Condition, NinetyPercentHoldIfTheCovarianceIsKnown) {
   const JointNormal joint = Sites();
   Random random(5);
   long counted = 0;
@@ -234,9 +235,9 @@ TEST(Condition, NinetyPercentHoldWhereTheCovarianceIsKnown) {
   EXPECT_NEAR(within / static_cast<double>(counted), 0.9, 0.005);
 }
 
-// Few people, and no model to lean on: the widening is what makes the interval hold. Without it
-// some 76 % would.
-TEST(Condition, NinetyPercentHoldWhereFewPeopleAreBehindIt) {
+// With few people and no model, only the widening makes the interval hold; without it the coverage
+// would be about 76 %.
+TEST(Condition, NinetyPercentHoldWithFewPeople) {
   JointNormal truth = Sites();
   const std::vector<Index> some = {0, 1, 5, 9, 12};
   truth.names = {"sg", "g", "pr", "me", "mso_l"};
@@ -258,7 +259,7 @@ TEST(Condition, NinetyPercentHoldWhereFewPeopleAreBehindIt) {
   }
 }
 
-TEST(Condition, RefusesWhatItCannotUse) {
+TEST(Condition, RefusesUnusableNumbers) {
   const JointNormal joint = Sites();
   const std::vector<KnownValue> strange = {{"nose", 3}}, twice = {{"g", 3}, {"g", 4}},
                                 endless = {{"g", INFINITY}};
@@ -267,5 +268,97 @@ TEST(Condition, RefusesWhatItCannotUse) {
   EXPECT_THAT(WordsOf<InputError>([&] { Condition(joint, endless); }), HasSubstr("finite"));
 }
 
+using Eigen::Index;
+using ::testing::HasSubstr;
+using testing::WordsOf;
+
+constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+
+// Two correlated numbers of that many people.
+JointSample Pairs(int count, double correlation, Random& random) {
+  JointSample sample{{"a", "b"}, Eigen::MatrixXd(count, 2)};
+  for (Index k = 0; k < count; ++k) {
+    const double x = random.Normal();
+    sample.values(k, 0) = 5 + 2 * x;
+    sample.values(k, 1) =
+        1 + 0.5 * (correlation * x + std::sqrt(1 - correlation * correlation) * random.Normal());
+  }
+  return sample;
+}
+
+TEST(FitJointNormal, IsTheSamplesOwnIfItIsComplete) {
+  Random random(3);
+  const JointSample sample = Pairs(30, 0.7, random);
+  const JointNormal joint = FitJointNormal(sample, Eigen::MatrixXd::Identity(2, 2), 0.0);
+  const Eigen::MatrixXd off = sample.values.rowwise() - sample.values.colwise().mean();
+  const Eigen::MatrixXd covariance = off.transpose() * off / 29;
+  EXPECT_NEAR(joint.mean[0], sample.values.col(0).mean(), 1e-9);
+  EXPECT_NEAR(joint.sd[1], std::sqrt(covariance(1, 1)), 1e-9);
+  EXPECT_NEAR(joint.correlation(0, 1),
+              covariance(0, 1) / std::sqrt(covariance(0, 0) * covariance(1, 1)), 1e-9);
+}
+
+// The reference solution: if all people have the first number and some lack the second, the maximum
+// likelihood mean of the second is that of its regression on the first (Anderson 1957).
+TEST(FitJointNormal, EstimatesMissingNumbersFromTheOthers) {
+  Random random(4);
+  JointSample sample = Pairs(200, 0.9, random);
+  double x = 0, y = 0, xx = 0, xy = 0;
+  int n = 0;
+  for (Index k = 0; k < sample.values.rows(); ++k) {
+    if (sample.values(k, 0) > 6) {  // the missing ones are not like the others
+      sample.values(k, 1) = kMissing;
+    } else {
+      x += sample.values(k, 0);
+      y += sample.values(k, 1);
+      ++n;
+    }
+  }
+  for (Index k = 0; k < sample.values.rows(); ++k) {
+    if (std::isfinite(sample.values(k, 1))) {
+      xx += std::pow(sample.values(k, 0) - x / n, 2);
+      xy += (sample.values(k, 0) - x / n) * (sample.values(k, 1) - y / n);
+    }
+  }
+  const double expected = y / n + xy / xx * (sample.values.col(0).mean() - x / n);
+  const JointNormal joint = FitJointNormal(sample, Eigen::MatrixXd::Identity(2, 2), 0.0);
+  EXPECT_NEAR(joint.mean[1], expected, 2e-3);
+  EXPECT_GT(std::abs(expected - y / n), 0.05);
+  EXPECT_EQ(joint.sample[0], 200);
+  EXPECT_EQ(joint.sample[1], n);
+}
+
+TEST(FitJointNormal, ShrinksMoreTowardsTheModelWithFewerPeople) {
+  Random random(6);
+  Eigen::MatrixXd target = Eigen::MatrixXd::Identity(2, 2);
+  target(0, 1) = target(1, 0) = 0.3;
+  const JointSample few = Pairs(6, 0.6, random), many = Pairs(3000, 0.6, random);
+  EXPECT_GT(ComputeShrinkage(few, target), ComputeShrinkage(many, target));
+  EXPECT_LT(ComputeShrinkage(many, target), 0.05);
+  EXPECT_EQ(ComputeShrinkage(Pairs(3, 0.6, random), target), 1);
+  EXPECT_NEAR(FitJointNormal(few, target, 1.0).correlation(0, 1), 0.3, 1e-9);
+}
+
+// With more sites than people and with gaps, the result can still be conditioned.
+TEST(FitJointNormal, IsPositiveDefiniteWithFewerPeopleThanNumbers) {
+  Random random(8);
+  JointSample sample{StandardSiteCodes(), Eigen::MatrixXd(9, 32)};
+  for (double& value : sample.values.reshaped()) {
+    value = random.Uniform() < 0.2 ? kMissing : 10 + random.Normal();
+  }
+  const Eigen::MatrixXd target = ModelledCorrelation({}, sample.names);
+  const JointNormal joint = FitJointNormal(sample, target);
+  EXPECT_EQ(joint.correlation.llt().info(), Eigen::Success);
+  EXPECT_GT(joint.shrinkage, 0.3);
+}
+
+TEST(FitJointNormal, RefusesANumberThatDoesNotVary) {
+  JointSample sample{{"a", "b"}, Eigen::MatrixXd::Constant(4, 2, 3)};
+  sample.values.col(0) << 1, 2, 3, 4;
+  EXPECT_THAT(WordsOf<InputError>([&] { FitJointNormal(sample, Eigen::MatrixXd::Identity(2, 2)); }),
+              HasSubstr("'b'"));
+}
+
 }  // namespace
+
 }  // namespace semblance

@@ -41,7 +41,7 @@ class LandmarkReadingTest : public ::testing::Test {
   testing::ScratchFolder folder_;
 };
 
-// All sites at odd points, with all that can be said of a landmark.
+// All sites at uneven points, with all fields of a landmark set.
 LandmarkFile SampleFile() {
   LandmarkFile file;
   file.subject = "sample";
@@ -61,7 +61,7 @@ LandmarkFile SampleFile() {
 
 class EveryKind : public LandmarkReadingTest, public ::testing::WithParamInterface<const char*> {};
 
-// What is written is read back, to the bit, but for what LostIn names.
+// A written file is read back with the same bits, except for the contents that LostIn names.
 TEST_P(EveryKind, ReadsWhatItWrites) {
   const LandmarkFile file = SampleFile();
   const std::string name = fmt::format("sample{}", GetParam());
@@ -90,7 +90,7 @@ INSTANTIATE_TEST_SUITE_P(, EveryKind,
                            return name;
                          });
 
-// Only YAML can say RAS; all others say LPS, or nothing, which is taken as LPS.
+// Only YAML can state RAS. All other formats state LPS, or nothing, which is taken as LPS.
 TEST_P(EveryKind, HoldsTheSamePointsWhateverTheAxes) {
   const LandmarkFile lps = SampleFile();
   LandmarkFile ras = lps;
@@ -112,7 +112,7 @@ TEST_P(EveryKind, HoldsTheSamePointsWhateverTheAxes) {
   EXPECT_EQ(says_ras, LostIn(ras, name) == LostIn(lps, name));
 }
 
-TEST_F(LandmarkReadingTest, SaysWhatAFileHasNoPlaceFor) {
+TEST_F(LandmarkReadingTest, ListsWhatAFileLoses) {
   LandmarkFile file = SampleFile();
   EXPECT_THAT(LostIn(file, "a.csv"), IsEmpty());
   EXPECT_THAT(LostIn(file, "a.fcsv"),
@@ -144,11 +144,11 @@ TEST_F(LandmarkReadingTest, SlicersAxesAreThoseOfTheFile) {
   EXPECT_THAT(ras.notes, ElementsAre(HasSubstr("turned from RAS to LPS")));
   EXPECT_THAT(Fault("a.mrk.json", markups("LAS")), HasSubstr("must be \"LPS\" or \"RAS\""));
   EXPECT_THAT(Fault("a.mrk.json", markups("LPS"), {.axes = Axes::kRas}),
-              HasSubstr("the file says LPS, and RAS was asked for"));
+              HasSubstr("the file has LPS axes, and RAS was requested"));
 }
 
-// Of Slicer's words for a point only "defined" means that it is placed; it writes "" as the
-// position of a point that has none, and leaves a missing one the position that it had.
+// Only Slicer's state "defined" means that a point is placed. Slicer writes "" as the position of a
+// point without one, and keeps the former position of a missing point.
 TEST_F(LandmarkReadingTest, SlicersPointsThatAreNotPlacedAreAbsent) {
   const auto markups = [](const std::string& point) {
     return fmt::format(
@@ -178,20 +178,20 @@ TEST_F(LandmarkReadingTest, SlicersPointsThatAreNotPlacedAreAbsent) {
               HasSubstr("point 2 'g': 'positionStatus' is 'gone'; it must be defined, undefined"));
 }
 
-TEST_F(LandmarkReadingTest, AxesThatAreAskedForMustBeThoseThatYamlSays) {
+TEST_F(LandmarkReadingTest, RequestedAxesMustAgreeWithYaml) {
   const std::string ras = "axes: RAS\nlandmarks: [{site: g, point: [1, 2, 3]}]\n";
   EXPECT_EQ(Read("a.yaml", ras, {.axes = Axes::kRas}).file.landmarks.at(0).point,
             (std::array{-1.0, -2.0, 3.0}));
   EXPECT_THAT(Fault("a.yaml", ras, {.axes = Axes::kLps}),
-              HasSubstr("the file says RAS, and LPS was asked for"));
+              HasSubstr("the file has RAS axes, and LPS was requested"));
   const std::string silent = "landmarks: [{site: g, point: [1, 2, 3]}]\n";
   EXPECT_EQ(Read("a.yaml", silent, {.axes = Axes::kLps}).file.landmarks.at(0).point,
             (std::array{1.0, 2.0, 3.0}));
   EXPECT_THAT(Fault("a.yaml", silent, {.axes = Axes::kRas}),
-              HasSubstr("correct `axes` in the file (LPS where it has none)"));
+              HasSubstr("correct `axes` in the file (LPS if it has none)"));
 }
 
-TEST_F(LandmarkReadingTest, WhatIsNoMarkupFileIsNamed) {
+TEST_F(LandmarkReadingTest, AFileWithoutMarkupsIsRefused) {
   for (const char* text : {"", "{\"markups\": [", "{}", "[]", "{\"markups\": [3]}",
                            "{\"markups\": [{\"coordinateSystem\": \"LPS\"}]}"}) {
     EXPECT_THAT(Fault("a.mrk.json", text), HasSubstr("a.mrk.json: ")) << text;
@@ -213,7 +213,7 @@ TEST_F(LandmarkReadingTest, OldFiducialListsOfSlicer) {
     const auto file = Read("a.fcsv", fmt::format(fmt::runtime(head), axes) + rows).file;
     EXPECT_EQ(file.landmarks.at(0).point, (std::array{2.5, -10.0, 30.0}));
   }
-  EXPECT_THAT(Fault("a.fcsv", rows), HasSubstr("no line '# CoordinateSystem"));
+  EXPECT_THAT(Fault("a.fcsv", rows), HasSubstr("the line '# CoordinateSystem"));
   EXPECT_THAT(Fault("a.fcsv", "# CoordinateSystem = LPS\n1,x,0,0,0,0,0,1,1,1,0,g,,\n"),
               HasSubstr("a.fcsv:2: 'x' is not a finite decimal number"));
 }
@@ -235,7 +235,7 @@ TEST_F(LandmarkReadingTest, PointsOfMeshLab) {
   EXPECT_THAT(Fault("a.pp",
                     "<PickedPoints><point x=\"1\" y=\"2\" z=\"3\" name=\"n\"/>"
                     "<point x=\"1\" y=\"2\" name=\"g\"/></PickedPoints>"),
-              HasSubstr("a.pp: point 2 'g': attribute z: there is none; place the point anew"));
+              HasSubstr("a.pp: point 2 'g': attribute z: missing; place the point again"));
   EXPECT_EQ(Fault("a.pp",
                   "<PickedPoints><point x=\"1\" y=\"2\" z=\"3\" name=\"n\"/>"
                   "<point x=\"nan\" active=\"0\" name=\"g\"/></PickedPoints>"),
@@ -264,8 +264,8 @@ TEST_F(LandmarkReadingTest, TablesWithCommasOrSemicolons) {
   EXPECT_EQ(reading.file.landmarks.at(0).point, (std::array{1.25, 2.5, -3.0}));
   EXPECT_EQ(reading.file.landmarks.at(0).depth_along_normal_mm, 4.5);
   EXPECT_EQ(reading.file.landmarks.at(1).depth_along_normal_mm, std::nullopt);
-  EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("columns that mean nothing here: Author"),
-                                         HasSubstr("taken as LPS")));
+  EXPECT_THAT(reading.notes,
+              ElementsAre(HasSubstr("ignored columns: Author"), HasSubstr("taken as LPS")));
   EXPECT_THAT(Fault("a.csv", "name,x,y\ng,1,2\n"), HasSubstr("there is no column z or z_mm"));
   EXPECT_THAT(Fault("a.csv", "site,x,y,z\ng,1,-2e90,3\n"),
               HasSubstr("a.csv: site g: a coordinate"));
@@ -295,7 +295,7 @@ TEST_F(LandmarkReadingTest, RefusesBytesThatAreNotUtf8AndNamesTheirLine) {
               HasSubstr("lat.fcsv:2: a byte"));
   EXPECT_EQ(Read("utf8.csv", "site,x,y,z,note\nn,1.5,2,3,caf\xc3\xa9\n").file.landmarks.at(0).note,
             "caf\xc3\xa9");
-  // XML says its own encoding; this is Latin-1, as the first line says.
+  // XML states its own encoding; here the first line states Latin-1.
   EXPECT_EQ(Fault("lat.pp",
                   "<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\n<PickedPoints><!-- caf\xe9 -->"
                   "<point x=\"1\" y=\"2\" z=\"3\" name=\"n\"/></PickedPoints>"),
@@ -315,14 +315,14 @@ TEST_F(LandmarkReadingTest, OnlyCommasInNumbersAreDecimalCommas) {
 TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
   const std::string table = "site,x,y,z\nF-1,0,0,0\ngonion,0,0,0\ng,0,0,0\nglabella,1,1,1\n";
   EXPECT_THAT(Fault("a.csv", table),
-              ::testing::AllOf(HasSubstr("'F-1' is not a site"), HasSubstr("stands on both sides"),
+              ::testing::AllOf(HasSubstr("'F-1' is not a site"), HasSubstr("is on both sides"),
                                HasSubstr("site g (Glabella) appears twice")));
   const LandmarkReading reading = Read("a.csv", "site,x,y,z\nF-1,0,0,0\ng,0,0,0\n",
                                        {.axes = Axes::kLps, .leave_out_unknown = true});
   EXPECT_EQ(reading.file.landmarks.size(), 1U);
   EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("left out: 'F-1' is not a site")));
   EXPECT_THAT(Fault("a.csv", "site,x,y,z\n"), HasSubstr("there is no landmark"));
-  EXPECT_THAT(Fault("a.stl", ""), HasSubstr("no kind of landmark file"));
+  EXPECT_THAT(Fault("a.stl", ""), HasSubstr("unknown kind of landmark file"));
 }
 
 }  // namespace

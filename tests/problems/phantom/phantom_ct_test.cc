@@ -15,7 +15,7 @@ namespace {
 using ::testing::HasSubstr;
 
 // Air is -1000, tissue 40: the sum over a head without bone tells its volume.
-TEST(PhantomCt, TheVolumeHoldsAsMuchAsTheMesh) {
+TEST(PhantomCt, HasTheVolumeOfTheMesh) {
   Phantom phantom = MakePhantom({.rings = 20});
   const double expected_mm3 = SignedVolume(phantom.face);
   const CtVolume volume =
@@ -66,7 +66,7 @@ TEST(PhantomCt, BoneIsLostInABallAndNowhereElse) {
   EXPECT_GT(lost, 50);
 }
 
-TEST(PhantomCt, ASiteThatIsNotThereCannotBeLost) {
+TEST(PhantomCt, RefusesADefectAtAnUnknownSite) {
   EXPECT_THAT(testing::WordsOf<InputError>(
                   [] { VoxelisePhantom(MakePhantom({.rings = 8}), {.defect = {.site = "zy"}}); }),
               HasSubstr("no site 'zy'"));

@@ -123,7 +123,7 @@ TEST(ExtraDowels, ADepthThatIsNotStatedIsTheTissuesWithAllThatItSays) {
   const Case set = of({"tissue.set_mm={mn: 7}"});
   EXPECT_EQ(At(set.dowels_on_bone, "mn").depth_mm, 7);
   EXPECT_THAT(set.notes, Contains(HasSubstr("mn (Mid-nasal): depth set to 7 mm by hand")));
-  EXPECT_THAT(set.notes, Not(Contains(HasSubstr("no dowel takes the depth"))));
+  EXPECT_THAT(set.notes, Not(Contains(HasSubstr("no dowel uses the depth"))));
   const Case known = of({"tissue.given={depths_mm: {mn: 6}}"});
   EXPECT_EQ(At(known.dowels_on_bone, "mn").depth_mm, 6);
   EXPECT_THAT(known.notes, Contains(HasSubstr("6 mm, known of this person")));

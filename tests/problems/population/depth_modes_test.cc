@@ -15,7 +15,7 @@ constexpr int kSide = 8, kCells = kSide * kSide;
 double First(int cell) { return 1 + 0.5 * std::sin(0.2 * cell); }
 double Second(int cell) { return 0.3 * std::cos(0.1 * cell); }
 
-// Depths of two modes, and of a share of the cells nothing.
+// Depths made of two modes, with a fraction of the cells missing.
 std::vector<DenseDepths> People(int count, double missing, std::vector<double>& first) {
   Random random(11);
   std::vector<DenseDepths> people;
@@ -42,7 +42,7 @@ double Correlation(const Eigen::VectorXd& a, const Eigen::VectorXd& b) {
   return x.dot(y) / (x.norm() * y.norm());
 }
 
-TEST(FindModes, FindsWhatDepthsWereMadeOf) {
+TEST(FindModes, FindsTheModesOfTheDepths) {
   std::vector<double> first;
   const auto people = People(80, 0, first);
   const DepthModes modes = FindModes(people, Options(4));
@@ -54,8 +54,8 @@ TEST(FindModes, FindsWhatDepthsWereMadeOf) {
   EXPECT_NEAR(modes.scores.col(0).squaredNorm() / 79, 1, 1e-9);
 }
 
-// What is missing is found from what is there: the modes are those of whole people.
-TEST(FindModes, AreHardlyOtherWhereAQuarterIsMissing) {
+// Missing depths are estimated from the others, so that the modes are those of complete people.
+TEST(FindModes, HardlyChangeWithAQuarterMissing) {
   std::vector<double> ignored, again;
   const DepthModes whole = FindModes(People(80, 0, ignored), Options(2));
   const DepthModes part = FindModes(People(80, 0.25, again), Options(2));

@@ -6,14 +6,14 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
-#include "problems/conditional/site_correlation.h"
+#include "problems/conditional/condition_depths.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/random.h"
 
 namespace semblance {
 namespace {
 
-// People of a known distribution, whose body mass index goes with the mean of their depths.
+// People of a known distribution, whose body mass index is correlated with their mean depth.
 std::vector<CountedSubject> People(int count) {
   const std::vector<std::string> sites = StandardSiteCodes();
   const Eigen::MatrixXd root = ModelledCorrelation({}, sites).llt().matrixL();
@@ -41,10 +41,10 @@ const Foresight& Way(const std::vector<Foresight>& ways, const std::string& name
   return *std::ranges::find(ways, name, &Foresight::name);
 }
 
-TEST(LeaveOneOut, WhatIsKnownHelpsAndTheStatedIntervalsHold) {
+TEST(LeaveOneOut, KnownFactsHelpAndTheStatedIntervalsHold) {
   const auto people = People(60);
   PopulationFile file;
-  const auto ways = LeaveOneOut(file, people, SampleOf(people, 0));
+  const auto ways = LeaveOneOut(file, people, MakeSample(people, 0));
   ASSERT_EQ(ways.size(), 4u);
   EXPECT_LT(Way(ways, "person").scores.mae_mm, Way(ways, "mean").scores.mae_mm);
   EXPECT_LT(Way(ways, "known").scores.mae_mm, Way(ways, "person").scores.mae_mm);
@@ -55,13 +55,13 @@ TEST(LeaveOneOut, WhatIsKnownHelpsAndTheStatedIntervalsHold) {
   }
 }
 
-// The oracle: with the mean alone, that of the others.
+// The reference solution of the method "mean" is the mean of the others.
 TEST(LeaveOneOut, TheSubjectIsNotInItsOwnMean) {
   auto people = People(5);
   for (CountedSubject& person : people) {
     person.person.bmi.reset();
   }
-  const JointSample sample = SampleOf(people, 0);
+  const JointSample sample = MakeSample(people, 0);
   const auto ways = LeaveOneOut({}, people, sample);
   ASSERT_EQ(ways.size(), 2u);
   const PredictedDepth& depth = ways[0].depths.front();
@@ -70,33 +70,33 @@ TEST(LeaveOneOut, TheSubjectIsNotInItsOwnMean) {
   EXPECT_NEAR(depth.predicted_mm, (sample.values.col(at).sum() - depth.depth_mm) / 4, 1e-9);
 }
 
-// The sex and age of one person alone tell nothing of the others: no way of its own, equal to the
-// mean.
-TEST(LeaveOneOut, WhatNoTwoDifferInIsNoWay) {
+// If sex and age are known of one person only, they predict nothing. The method would equal "mean"
+// and is left out.
+TEST(LeaveOneOut, LeavesOutAMethodWithoutVaryingNumbers) {
   auto people = People(5);
   for (CountedSubject& person : people) {
     person.person.bmi.reset();
   }
   people[1].person.sex = Sex::kMale;
   people[1].person.age_years = 39;
-  EXPECT_EQ(LeaveOneOut({}, people, SampleOf(people, 0)).size(), 2u);
+  EXPECT_EQ(LeaveOneOut({}, people, MakeSample(people, 0)).size(), 2u);
   people[2].person.age_years = 52;
-  EXPECT_EQ(LeaveOneOut({}, people, SampleOf(people, 0)).size(), 4u);
+  EXPECT_EQ(LeaveOneOut({}, people, MakeSample(people, 0)).size(), 4u);
 }
 
-// A way that knows nothing would be the mean again.
-TEST(LeaveOneOut, WithoutKnownSitesThereIsNoWayOfThem) {
+// A method without known sites would repeat the mean.
+TEST(LeaveOneOut, LeavesOutTheMethodWithoutKnownSites) {
   const auto people = People(5);
   PopulationFile file;
   file.known.clear();
-  const auto ways = LeaveOneOut(file, people, SampleOf(people, 0));
+  const auto ways = LeaveOneOut(file, people, MakeSample(people, 0));
   ASSERT_EQ(ways.size(), 2u);
   EXPECT_EQ(ways[0].name, "mean");
   EXPECT_EQ(ways[1].name, "person");
   EXPECT_EQ(ways[0].scores.points, 5 * 32);
 }
 
-TEST(LeaveOneOut, TablesHaveNamesOfTheirOwnAndSayWhatTheyAssume) {
+TEST(LeaveOneOut, TablesHaveUniqueNamesAndCountAssumptions) {
   auto people = People(5);
   people[0].person.sex = people[1].person.sex = Sex::kFemale;
   people[0].person.build = Build::kNormal;
@@ -104,7 +104,7 @@ TEST(LeaveOneOut, TablesHaveNamesOfTheirOwnAndSayWhatTheyAssume) {
   const std::string tables = SEMBLANCE_SOURCE_DIR "/configs/tables/";
   file.tables = {tables + "t_table_2023.yaml", tables + "t_table_2023.yaml",
                  tables + "rhine_caucasoid.yaml"};
-  const auto ways = LeaveOneOut(file, people, SampleOf(people, 0));
+  const auto ways = LeaveOneOut(file, people, MakeSample(people, 0));
   ASSERT_EQ(ways.size(), 7u);
   EXPECT_EQ(ways[4].name, "t_table_2023");
   EXPECT_EQ(ways[5].name, "t_table_2023 (2)");
@@ -113,11 +113,11 @@ TEST(LeaveOneOut, TablesHaveNamesOfTheirOwnAndSayWhatTheyAssume) {
   EXPECT_EQ(ways[0].assumed, 0);
 }
 
-TEST(LeaveOneOut, ScoresAPublishedTableBesideThem) {
+TEST(LeaveOneOut, ScoresAPublishedTableToo) {
   const auto people = People(12);
   PopulationFile file;
   file.tables = {SEMBLANCE_SOURCE_DIR "/configs/tables/t_table_2023.yaml"};
-  const auto ways = LeaveOneOut(file, people, SampleOf(people, 0));
+  const auto ways = LeaveOneOut(file, people, MakeSample(people, 0));
   EXPECT_EQ(ways.back().name, "t_table_2023");
   EXPECT_EQ(ways.back().scores.points, ways.front().scores.points);
 }

@@ -6,7 +6,7 @@
 
 #include <Eigen/Cholesky>
 
-#include "problems/conditional/site_correlation.h"
+#include "problems/conditional/condition_depths.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/random.h"
 
@@ -32,10 +32,10 @@ JointSample People(int count, std::uint64_t random_seed) {
 
 JointNormal Fitted(const JointSample& sample) { return FitPopulation(sample, {}, std::nullopt); }
 
-TEST(FindOutliers, FindsADepthThatItsNeighboursDoNotLetExpect) {
+TEST(FindOutliers, FindsADepthThatDisagreesWithItsNeighbours) {
   JointSample sample = People(60, 1);
   EXPECT_THAT(FindOutliers(sample, Fitted(sample), {.site_z = 5, .subject_z = 6}), IsEmpty());
-  // Within the range of its site, but not of a face that is so thin elsewhere.
+  // The depth is within the range of its site, but not for a face that is so thin elsewhere.
   sample.values.row(17).setConstant(7.5);
   sample.values(17, 12) = 14;
   const auto found = FindOutliers(sample, Fitted(sample), {.site_z = 5, .subject_z = 6});
@@ -57,7 +57,7 @@ TEST(FindOutliers, FindsASubjectOfAnotherUnit) {
   EXPECT_FALSE(without.values.row(5).array().isFinite().any());
 }
 
-TEST(FindOutliers, SaysNothingOfFew) {
+TEST(FindOutliers, SkipsSitesOfFewSubjects) {
   JointSample sample = People(7, 3);
   sample.values(2, 2) = 90;
   EXPECT_THAT(FindOutliers(sample, Fitted(sample), {}), IsEmpty());

@@ -14,10 +14,10 @@
 #include "problems/config/config.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/metrics/statistics.h"
-#include "problems/phantom/phantom_landmarks.h"
-#include "problems/population/population_files.h"
 #include "problems/population/population_report.h"
+#include "problems/population/population_result.h"
 #include "problems/subject/dowel_depths.h"
+#include "problems/subject/phantom.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -50,7 +50,7 @@ PopulationResult Analysed(const PopulationPlan& plan, const fs::path& folder) {
   return AnalysePopulation(plan, ReadMeasured(plan, folder));
 }
 
-// Meshes and landmarks of a phantom, as a user's folder has them.
+// Writes meshes and landmarks of a phantom as in a user's folder.
 void WriteHead(const fs::path& folder, std::uint64_t random_seed, bool with_landmarks) {
   const Phantom phantom = MakePhantom({.random_seed = random_seed, .rings = 32});
   fs::create_directories(folder);
@@ -62,7 +62,7 @@ void WriteHead(const fs::path& folder, std::uint64_t random_seed, bool with_land
   }
 }
 
-TEST(MeasurePopulation, GoesOnWhereItWasAndShardsGiveTheSameBytes) {
+TEST(MeasurePopulation, ContinuesWhereItStoppedAndShardsGiveTheSameBytes) {
   const ScratchFolder folder;
   constexpr int kFew = 4;
   PopulationPlan plan = Phantoms(folder);
@@ -110,8 +110,8 @@ TEST(MeasurePopulation, GoesOnWhereItWasAndShardsGiveTheSameBytes) {
   }
 }
 
-// The phantoms' depths are known: a coarse mesh of them is off by little.
-TEST(AnalysePopulation, MeasuresWhatPhantomsAreMadeOfAndMakesATableOfIt) {
+// The depths of phantoms are known; their coarse meshes have small errors.
+TEST(AnalysePopulation, MeasuresPhantomsAndMakesATable) {
   const ScratchFolder folder;
   const PopulationPlan plan = Phantoms(folder);
   MeasurePopulation(plan, folder / "out", {.jobs = 2}, {});
@@ -143,8 +143,7 @@ TEST(AnalysePopulation, MeasuresWhatPhantomsAreMadeOfAndMakesATableOfIt) {
   EXPECT_EQ(FindDepth(table, Sex::kMale, Build::kNormal, "go_l")->n, kCount);
 }
 
-// What the phantoms are made of at a landmark, both sides of a pair taken as one, as a table has
-// it.
+// The true depths of the phantoms at a landmark, with both sides of a pair as one, as in a table.
 struct TrueDepths {
   double mean_mm = 0, variance_mm2 = 0;
 };
@@ -166,9 +165,9 @@ TrueDepths TrueDepthsAt(const std::vector<Phantom>& phantoms, const std::string&
   return {truth.mean_mm / sides, truth.variance_mm2 / sides};
 }
 
-// Errors that all heads share do not average out, so that each site is looked at alone: chords of
-// a mesh this coarse are off by 0.1 mm where bone and skin are bent most (me), alike in all heads.
-TEST(AnalysePopulation, OfManyPhantomsHasTheMeansAndDeviationsOfWhatTheyAreMadeOf) {
+// Errors that all heads share do not average out, so each site has its own limit: chords of such a
+// coarse mesh are off by 0.1 mm where bone and skin curve most (me), in all heads alike.
+TEST(AnalysePopulation, OfManyPhantomsHasTheTrueMeansAndDeviations) {
   constexpr int kMany = 100;  // small ones: some 50 ms each
   constexpr double kChord_mm = 0.12, kScatter_mm = 0.03, kShare = 0.02;
   const ScratchFolder folder;
@@ -206,7 +205,7 @@ TEST(AnalysePopulation, OfManyPhantomsHasTheMeansAndDeviationsOfWhatTheyAreMadeO
   }
 }
 
-TEST(MeasurePopulation, AFailureIsARowWithItsReason) {
+TEST(MeasurePopulation, AFailureIsRecordedWithItsReason) {
   const ScratchFolder folder;
   PopulationPlan plan = Phantoms(folder);
   plan.entries.resize(4);
@@ -232,13 +231,13 @@ TEST(GatherSubjects, AFolderWithoutSubjectsIsRefusedBeforeAnythingIsCopied) {
       GatherSubjects(plan, folder / "b", {folder / "a", folder / other});
     });
   };
-  EXPECT_THAT(refused("nowhere"), HasSubstr("nowhere: there is no such folder"));
+  EXPECT_THAT(refused("nowhere"), HasSubstr("nowhere: the folder does not exist"));
   fs::create_directories(folder / "empty");
-  EXPECT_THAT(refused("empty"), HasSubstr("empty: there is no subjects/ in it"));
+  EXPECT_THAT(refused("empty"), HasSubstr("empty: it contains no subjects/"));
   EXPECT_FALSE(fs::exists(folder / "b"));
 }
 
-TEST(RefuseOtherFolder, LetsThisPopulationGoOnAndNothingElse) {
+TEST(RefuseOtherFolder, AcceptsOnlyThisPopulation) {
   const ScratchFolder folder;
   PopulationPlan plan = Phantoms(folder);
   plan.entries.resize(3);
@@ -246,27 +245,27 @@ TEST(RefuseOtherFolder, LetsThisPopulationGoOnAndNothingElse) {
     return WordsOf<IoError>([&] { RefuseOtherFolder(plan, folder / name); });
   };
   RefuseOtherFolder(plan, folder / "missing");
-  // Another shard has just begun.
+  // Another shard has just created the folder.
   fs::create_directories(folder / "begun/subjects");
   WriteFileAtomically(folder / "begun/.semblance-probe.7-0.tmp", "");
   WriteFileAtomically(folder / "begun/subjects/.1234.json.7-0.tmp", "");
   RefuseOtherFolder(plan, folder / "begun");
   fs::create_directories(folder / "foreign");
   WriteFileAtomically(folder / "foreign/report.html", "a study's");
-  EXPECT_THAT(words("foreign"), HasSubstr("not empty, and holds no population"));
+  EXPECT_THAT(words("foreign"), HasSubstr("not empty and contains no population"));
   EXPECT_THAT(words("foreign"), HasSubstr("--force"));
   const auto measured = [&](const char* name, const std::string& id) {
     fs::create_directories(folder / name / "subjects");
     WriteFileAtomically(folder / name / "subjects" / (id + ".json"), "{}");
   };
   measured("other", "0123456789ab");
-  EXPECT_THAT(words("other"), HasSubstr("none of its subjects is one of this"));
+  EXPECT_THAT(words("other"), HasSubstr("none of its subjects has the same files"));
   measured("ours", plan.entries[2].id);
   RefuseOtherFolder(plan, folder / "ours");
   const auto with_results = [&](const std::string& json) {
     WriteFileAtomically(folder / "ours/population.json", json);
   };
-  with_results("{\"title\": \"crowd\"}");  // of a version that did not tell the id
+  with_results("{\"title\": \"crowd\"}");  // of a version without an id
   RefuseOtherFolder(plan, folder / "ours");
   with_results("{\"title\": \"crowd\", \"id\": \"population\"}");
   RefuseOtherFolder(plan, folder / "ours");
@@ -276,7 +275,7 @@ TEST(RefuseOtherFolder, LetsThisPopulationGoOnAndNothingElse) {
   EXPECT_THAT(words("ours"), HasSubstr("another population, 'others'"));
 }
 
-TEST(AnalysePopulation, OfTooFewSaysWhyAndWhoFailed) {
+TEST(AnalysePopulation, OfTooFewStatesWhyAndWhoFailed) {
   const ScratchFolder folder;
   PopulationPlan plan = Phantoms(folder);
   plan.entries.resize(3);
@@ -296,21 +295,21 @@ TEST(AnalysePopulation, OfTooFewSaysWhyAndWhoFailed) {
   EXPECT_EQ(WhyNoTable(plan, subjects), "");
 }
 
-TEST(AnalysePopulation, SaysWhatItDidNotLookForAndWhatATableLeavesOpen) {
+TEST(AnalysePopulation, NotesUnsearchedOutliersAndMissingDeviations) {
   const ScratchFolder folder;
   const std::string tables = SEMBLANCE_SOURCE_DIR "/configs/tables/";
   PopulationPlan plan = Phantoms(folder, fmt::format("tables: [{}rhine_caucasoid.yaml]\n", tables));
   plan.entries.resize(4);
   MeasurePopulation(plan, folder / "out", {.jobs = 2}, {});
   const PopulationResult few = Analysed(plan, folder / "out");
-  EXPECT_THAT(few.notes, Contains("fewer than 8 subjects: outliers are not looked for"));
+  EXPECT_THAT(few.notes, Contains("fewer than 8 subjects: outliers are not searched for"));
   EXPECT_THAT(few.notes, Contains(HasSubstr("the sex or build of 4 of 4 subjects is not known")));
   const std::string text = PopulationText(few);
-  EXPECT_THAT(text, HasSubstr("\noutliers not looked for\n"));
+  EXPECT_THAT(text, HasSubstr("\noutliers not searched for\n"));
   EXPECT_THAT(text, HasSubstr("no sd stated"));
   EXPECT_THAT(text, Not(HasSubstr("nan")));
   EXPECT_THAT(PopulationReport(few), HasSubstr("The search needs at least 8 subjects"));
-  // Eight are enough, but not at a site that one of them lacks.
+  // Eight subjects are enough, but not at a site that one of them lacks.
   std::vector<MeasuredSubject> subjects = ReadMeasured(plan, folder / "out");
   for (int k = 0; k < 4; ++k) {
     MeasuredSubject twin = subjects[k];
@@ -321,12 +320,12 @@ TEST(AnalysePopulation, SaysWhatItDidNotLookForAndWhatATableLeavesOpen) {
   }
   subjects[0].depths.sites[0].depth_mm = kNaN;
   const PopulationResult eight = AnalysePopulation(plan, subjects);
-  EXPECT_THAT(eight.notes, Contains(HasSubstr("not looked for at 1 of 32 sites")));
+  EXPECT_THAT(eight.notes, Contains(HasSubstr("not searched for at 1 of 32 sites")));
   EXPECT_THAT(PopulationText(eight), HasSubstr("0 outliers"));
 }
 
-// A proposal is no person's mistake: what is left of it is as good as it was.
-TEST(MeasureSubject, OfProposedLandmarksOnOnePointTheSurestCounts) {
+// A proposal contains no person's mistake, so its other sites remain valid.
+TEST(MeasureSubject, OfProposedLandmarksAtOnePointTheMostConfidentCounts) {
   const Phantom phantom = MakePhantom({.random_seed = 4, .rings = 32});
   const ScratchFolder folder;
   LandmarkFile landmarks = PhantomLandmarks(phantom, 4);
@@ -354,11 +353,11 @@ TEST(MeasureSubject, OfProposedLandmarksOnOnePointTheSurestCounts) {
     EXPECT_EQ(std::isfinite(site.depth_mm), site.site != "pg") << site.site << site.why_not;
   }
   EXPECT_EQ(depths.sites.back().site, "pg");
-  EXPECT_THAT(depths.sites.back().why_not, HasSubstr("proposed on the point of sm"));
-  EXPECT_THAT(depths.notes, Contains(HasSubstr("pg: proposed on the point of sm")));
+  EXPECT_THAT(depths.sites.back().why_not, HasSubstr("proposed at the point of sm"));
+  EXPECT_THAT(depths.notes, Contains(HasSubstr("pg: proposed at the point of sm")));
 }
 
-TEST(ReadPopulation, RefusesSitesThatThereAreNot) {
+TEST(ReadPopulation, RefusesUnknownSites) {
   const ScratchFolder folder;
   const auto words = [&](const std::string& more) {
     return WordsOf<Error>([&] { Phantoms(folder, more); });
@@ -367,11 +366,11 @@ TEST(ReadPopulation, RefusesSitesThatThereAreNot) {
               HasSubstr("known: unknown site 'zx_l'; did you mean 'zy_l'?"));
   EXPECT_THAT(words("subjects: [{name: a, exclude: [xx], subject: {type: phantom}}]\n"),
               HasSubstr("subjects[0].exclude: unknown site 'xx'; known are: "));
-  EXPECT_EQ(ComplaintAboutCodes({"g", "go", "go_l", "mmb"}), "");
+  EXPECT_EQ(SiteCodesFault({"g", "go", "go_l", "mmb"}), "");
   Phantoms(folder, "known: []\n");
 }
 
-TEST(ReadPopulation, OfAFolderTakesCapitalsAndTellsWhatItPassesOver) {
+TEST(ReadPopulation, OfAFolderAcceptsCapitalsAndNotesSkippedFolders) {
   const ScratchFolder folder;
   WriteHead(folder / "heads/a", 1, /*with_landmarks=*/true);
   for (const auto& [from, to] : {std::pair{"skull.ply", "Skull.PLY"},
@@ -391,13 +390,13 @@ TEST(ReadPopulation, OfAFolderTakesCapitalsAndTellsWhatItPassesOver) {
   EXPECT_EQ(files.skin, folder / "heads/a/SKIN.ply");
   EXPECT_EQ(files.landmarks, folder / "heads/a/Landmarks.yaml");
   EXPECT_EQ(std::get<CtSubject>(plan.entries[1].subject.subject).volume, folder / "heads/b/CT");
-  EXPECT_THAT(plan.notes, ElementsAre(HasSubstr("c: passed over")));
+  EXPECT_THAT(plan.notes, ElementsAre(HasSubstr("c: skipped")));
   WriteFileAtomically(folder / "heads/a/skin.PLY", "");
   EXPECT_THAT(WordsOf<InputError>([&] { ReadPopulation(folder / "heads"); }),
               HasSubstr("both SKIN.ply and skin.PLY are there; keep one"));
 }
 
-TEST(ReadPopulation, RefusesWhatSubjectsCsvCannotMean) {
+TEST(ReadPopulation, RefusesFaultyRowsOfSubjectsCsv) {
   const ScratchFolder folder;
   WriteHead(folder / "heads/anna", 1, /*with_landmarks=*/true);
   WriteHead(folder / "heads/bert", 2, /*with_landmarks=*/true);
@@ -417,7 +416,7 @@ TEST(ReadPopulation, RefusesWhatSubjectsCsvCannotMean) {
   EXPECT_THAT(words("bmi\n"), HasSubstr("there is no column 'name'"));
 }
 
-TEST(ReadPopulation, OfAFolderTakesItsSubjectsAndWhatIsKnownOfThem) {
+TEST(ReadPopulation, OfAFolderReadsItsSubjectsAndTheirCovariates) {
   const ScratchFolder folder;
   for (const int k : {1, 2, 3}) {
     WriteHead(folder / ("head" + std::to_string(k)), k, /*with_landmarks=*/k != 3);

@@ -40,7 +40,7 @@ LandmarkFile FileOf(const Phantom& phantom) {
   return file;
 }
 
-// Without the bone within 35 mm of the left cheek.
+// The skull without the bone within 35 mm of the left cheek.
 TriMesh WithoutCheek(const Phantom& phantom) {
   const Vec3 cheek =
       std::ranges::find(phantom.sites, std::string("im_l"), &PhantomSite::site)->base;
@@ -75,7 +75,7 @@ TEST(FitMidPlane, FindsThePlaneOfAMirroredSet) {
   EXPECT_EQ(found.midline, 10);
 }
 
-TEST(FitMidPlane, IsTheLeastOfItsSum) {
+TEST(FitMidPlane, MinimisesItsSumOfSquares) {
   const std::vector<SitePoint> sites = SitesOf(MakePhantom({.random_seed = 4, .rings = 20}));
   const MidPlane found = FitMidPlane(sites);
   const auto sum = [&](const Vec3& normal, double offset_mm) {
@@ -98,26 +98,26 @@ TEST(FitMidPlane, IsTheLeastOfItsSum) {
   EXPECT_GT(sum(found.normal, found.offset_mm - 0.01), least);
 }
 
-TEST(FitMidPlane, NeedsSitesThatSayHowItLies) {
+TEST(FitMidPlane, NeedsSitesThatDetermineThePlane) {
   const std::vector<SitePoint> all = SitesOf(MakePhantom({.rings = 20}));
   EXPECT_THAT(WordsOf<InputError>([&] { FitMidPlane(std::span(all).first(10)); }),
               HasSubstr("0 pairs of sites and 10 in the midline"));
 }
 
-TEST(MirrorMissing, ACheekThatIsCutOffComesBackFromTheOtherSide) {
+TEST(MirrorMissing, ACutCheekIsRestoredFromTheOtherSide) {
   const Phantom phantom = MakePhantom({.random_seed = 2, .rings = 100});
   const TriMesh cut = WithoutCheek(phantom);
   const double gone_cm2 = (Area(phantom.skull) - Area(cut)) / 100;
   ASSERT_GT(gone_cm2, 20);
   const MirroredSkull whole = MirrorMissing(cut, FitMidPlane(SitesOf(phantom)), {}, 2);
-  // What was observed, to the bit and in front.
+  // The observed bone comes first and keeps its exact bits.
   ASSERT_GT(whole.mesh.points.size(), cut.points.size());
   EXPECT_TRUE(std::equal(cut.points.begin(), cut.points.end(), whole.mesh.points.begin()));
   EXPECT_TRUE(std::equal(cut.triangles.begin(), cut.triangles.end(), whole.mesh.triangles.begin()));
   for (std::size_t t = 0; t < whole.origin.size(); ++t) {
     EXPECT_EQ(whole.origin[t] == BoneOrigin::kMirrored, t >= cut.triangles.size());
   }
-  // As far from the true bone as the head is from its mirror image.
+  // The mirrored bone is as far from the true bone as the head is from its mirror image.
   const MeshQuery query(whole.mesh), truth(phantom.skull);
   double most_mm = 0;
   for (const Vec3& p : phantom.skull.points) {
@@ -152,7 +152,7 @@ TEST(MirrorMissing, APlaneThatMirrorsNothingIsRefused) {
               HasSubstr("does not mirror it"));
 }
 
-TEST(PrepareMirrored, TellsWhatItInventsAndMirrorsTheLandmarkThere) {
+TEST(PrepareMirrored, NotesInventedBoneAndMirrorsTheLandmarkThere) {
   const Phantom phantom = MakePhantom({.random_seed = 2, .rings = 60});
   TriMesh skull = WithoutCheek(phantom);
   LandmarkFile file = FileOf(phantom);
@@ -177,7 +177,7 @@ TEST(PrepareMirrored, TellsWhatItInventsAndMirrorsTheLandmarkThere) {
   EXPECT_LT((Vec3(found->point.data()) - truth).norm(), 5);
 }
 
-TEST(OriginOfShell, WhatIsFarFromBoneIsInferred) {
+TEST(OriginOfShell, BoneFarFromTheSkullIsInferred) {
   const Phantom phantom = MakePhantom({.random_seed = 2, .rings = 40});
   const TriMesh cut = WithoutCheek(phantom);
   const auto origin = OriginOfShell(phantom.skull, cut, {}, 2);

@@ -133,7 +133,7 @@ TEST_F(CommandLine, DepthSaysHowFarTheSchemeIsFromTheTruthAndFromLeftOutDowels) 
                              "--set 'tissue={depths: table, table: " +
                              kConfigs + "/tables/t_table_2023.yaml, given: {measured: [g]}}'");
   EXPECT_EQ(given.code, 0) << given.err;
-  EXPECT_THAT(given.out, HasSubstr("note: tissue depths are those to be expected given g"));
+  EXPECT_THAT(given.out, HasSubstr("note: tissue depths are those expected given g"));
   ExpectRefused("depth " + kConfigs +
                     "/phantom.yaml --out map --quiet --set subject.rings=30 "
                     "--set interp=depth_map",

@@ -70,7 +70,7 @@ TEST_F(PopulationCommand, ListTellsWhatIsPassedOver) {
   fs::create_directories(folder_ / "heads/scans");
   const testing::Outcome outcome = Call("heads --list");
   EXPECT_EQ(outcome.code, 0);
-  EXPECT_THAT(outcome.out, HasSubstr("note: scans: passed over"));
+  EXPECT_THAT(outcome.out, HasSubstr("note: scans: skipped"));
   EXPECT_THAT(outcome.out, HasSubstr("1 subjects"));
 }
 
@@ -108,7 +108,7 @@ TEST_F(PopulationCommand, RefusesToGatherFromWhatIsNotThere) {
   WriteCrowd("three.yaml", "three", 3);
   const testing::Outcome outcome = Call("three.yaml --out out --from nowhere");
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("nowhere: there is no such folder"));
+  EXPECT_THAT(outcome.err, HasSubstr("nowhere: the folder does not exist"));
 }
 
 }  // namespace

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 
-#include "problems/propose/proposal_table.h"
 #include "problems/subject/phantom.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
@@ -54,7 +53,7 @@ std::string ErrorOf(const TriMesh& skull) {
   return "no error";
 }
 
-TEST(ProposeLandmarks, AMovedAndScaledHeadGetsItsSites) {
+TEST(ProposeLandmarks, FindsTheSitesOfAMovedAndScaledHead) {
   const Phantom phantom = PhantomOf(4);
   const std::vector<ReferenceHead> references = OneReference();
   Random random(9);
@@ -74,7 +73,7 @@ TEST(ProposeLandmarks, AMovedAndScaledHeadGetsItsSites) {
   EXPECT_LT(found.most_mm, 10);
 }
 
-TEST(ProposeLandmarks, ThreadsChangeNoBit) {
+TEST(ProposeLandmarks, DoesNotDependOnThreads) {
   const TriMesh skull = PhantomOf(4).skull;
   const std::vector<ReferenceHead> references = OneReference();
   const Proposal one = ProposeLandmarks(skull, "skull.ply", references,
@@ -88,7 +87,7 @@ TEST(ProposeLandmarks, ThreadsChangeNoBit) {
   }
 }
 
-TEST(ProposeLandmarks, ASkullInRasIsKnownAndItsFileSaysSo) {
+TEST(ProposeLandmarks, RecognisesRasAndWritesItToTheFile) {
   const Phantom phantom = PhantomOf(4);
   const Similarity ras = {.scale = 1,
                           .rotation = Vec3(-1, -1, 1).asDiagonal().toDenseMatrix(),
@@ -103,7 +102,7 @@ TEST(ProposeLandmarks, ASkullInRasIsKnownAndItsFileSaysSo) {
   EXPECT_LT(left->point.x(), -30);  // in the file's frame
 }
 
-// A mirrored skull is a skull too: its left is on the left.
+// A mirrored skull is a skull too, and its left sites are on its left.
 TEST(ProposeLandmarks, SidesAreNeverExchanged) {
   TriMesh mirrored = PhantomOf(4).skull;
   for (Vec3& p : mirrored.points) {
@@ -121,7 +120,7 @@ TEST(ProposeLandmarks, SidesAreNeverExchanged) {
   }
 }
 
-TEST(ProposeLandmarks, WhatIsNotThereIsAbsent) {
+TEST(ProposeLandmarks, MissingBoneGivesAbsentSites) {
   const Phantom phantom = PhantomOf(4);
   std::vector<bool> keep;
   for (const Triangle& t : phantom.skull.triangles) {
@@ -138,18 +137,18 @@ TEST(ProposeLandmarks, WhatIsNotThereIsAbsent) {
   EXPECT_NE(std::ranges::find(proposal.sites, "g", &ProposedSite::site), proposal.sites.end());
 }
 
-TEST(ProposeLandmarks, WhatIsNoSkullGetsOneClearLine) {
+TEST(ProposeLandmarks, AMeshThatIsNoSkullGivesOneClearLine) {
   EXPECT_THAT(ErrorOf({}), HasSubstr("skull.ply: the mesh has no triangles"));
   const TriMesh skull = PhantomOf(4).skull;
   EXPECT_THAT(ErrorOf(testing::SphereMesh(Vec3(0, 80, 0), 95, 60)),
-              HasSubstr("skull.ply: its shape does not say how it lies"));
+              HasSubstr("skull.ply: its shape does not determine its pose"));
   const Similarity aside = {.scale = 1, .rotation = Mat3::Identity(), .translation = {170, 0, 0}};
   const TriMesh two = testing::Joined(skull, Transformed(skull, aside));
   EXPECT_THAT(ErrorOf(two), HasSubstr("skull.ply: it has two bodies as large as a skull"));
   EXPECT_THROW(ProposeLandmarks(skull, "skull.ply", {}, {}), InputError);
 }
 
-TEST(ProposeLandmarks, SurerSitesHaveLessToDoubt) {
+TEST(ProposeLandmarks, MoreConfidentSitesHaveSmallerErrors) {
   const std::vector<ReferenceHead> references = OneReference();
   for (const ProposedSite& s :
        ProposeLandmarks(PhantomOf(4).skull, "skull.ply", references, {}).sites) {
@@ -159,7 +158,7 @@ TEST(ProposeLandmarks, SurerSitesHaveLessToDoubt) {
   }
 }
 
-TEST(ReferenceHead, MirroredTwiceItIsItself) {
+TEST(ReferenceHead, MirroredTwiceIsUnchanged) {
   const ReferenceHead head = PhantomReference(3);
   const ReferenceHead back = Mirrored(Mirrored(head));
   ASSERT_EQ(back.sites.size(), head.sites.size());
@@ -171,5 +170,42 @@ TEST(ReferenceHead, MirroredTwiceItIsItself) {
   EXPECT_GT(SignedVolume(Mirrored(head).shell.mesh), 0);
 }
 
+using ::testing::HasSubstr;
+
+LandmarkFile FileOf(const std::vector<std::pair<std::string, double>>& x_of_site) {
+  LandmarkFile file;
+  for (const auto& [site, x] : x_of_site) {
+    Landmark landmark;
+    landmark.site = site;
+    landmark.point = {x, 0, 0};
+    file.landmarks.push_back(landmark);
+  }
+  return file;
+}
+
+TEST(CompareProposal, GivesDistancesAndTheirQuantiles) {
+  const ProposalComparison c = CompareProposal(FileOf({{"g", 1}, {"n", 4}, {"pg", 2}}),
+                                               FileOf({{"g", 0}, {"n", 0}, {"pg", 0}}));
+  EXPECT_EQ(c.compared, 3);
+  EXPECT_EQ(c.median_mm, 2);
+  EXPECT_EQ(c.nine_tenths_mm, 4);
+  EXPECT_EQ(c.most_mm, 4);
+}
+
+TEST(CompareProposal, NotesSitesOfOneFileAndDoesNotCountThem) {
+  const ProposalComparison c =
+      CompareProposal(FileOf({{"g", 1}, {"n", 4}}), FileOf({{"g", 0}, {"pg", 0}}));
+  EXPECT_EQ(c.compared, 1);
+  const std::string text = FormatComparison(c);
+  EXPECT_THAT(text, HasSubstr("proposed, and not placed by hand"));
+  EXPECT_THAT(text, HasSubstr("placed by hand, and not proposed"));
+  EXPECT_THAT(text, HasSubstr("1 sites: median 1.0 mm"));
+}
+
+TEST(CompareProposal, NoCommonSiteIsAnError) {
+  EXPECT_THROW(CompareProposal(FileOf({{"g", 1}}), FileOf({{"n", 1}})), InputError);
+}
+
 }  // namespace
+
 }  // namespace semblance

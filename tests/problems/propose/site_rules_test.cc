@@ -12,7 +12,7 @@
 namespace semblance {
 namespace {
 
-// A ball in place of a skull: what lies furthest in a direction is known.
+// A ball instead of a skull, because its farthest point in a direction is known.
 constexpr double kRadius_mm = 40;
 SkullShell Ball() { return AsShell(testing::SphereMesh(Vec3::Zero(), kRadius_mm, 120)); }
 
@@ -20,9 +20,9 @@ Vec3 OnBall(const Vec3& direction) { return kRadius_mm * direction.normalized();
 
 TEST(SiteRules, EverySiteHasOne) {
   for (const std::string& site : StandardSiteCodes()) {
-    EXPECT_FALSE(RuleOf(site).what.empty()) << site;
+    EXPECT_FALSE(FindSiteRule(site).what.empty()) << site;
   }
-  EXPECT_THROW(RuleOf("xx"), InputError);
+  EXPECT_THROW(FindSiteRule("xx"), InputError);
 }
 
 TEST(SiteRules, WithoutADirectionTheClosestBoneCounts) {
@@ -33,14 +33,14 @@ TEST(SiteRules, WithoutADirectionTheClosestBoneCounts) {
   EXPECT_EQ(found.sharpness_mm, 0);
 }
 
-// On a ball the furthest point less its squared distance over twice the reach lies on the great
-// circle towards the direction, at an angle that follows from R and the reach.
+// On a ball the maximum of the rule's score lies on the great circle towards the direction, at an
+// angle that follows from the radius R and the reach.
 TEST(SiteRules, TheSiteGoesTowardsItsDirection) {
   const double start = 0.15;  // radians below and before the lowest point
   const Vec3 predicted = OnBall({0, -std::sin(start), -std::cos(start)});
   const SnappedSite found = SnapToBone("me", predicted, Ball(), Mat3::Identity());
-  const double reach_mm = RuleOf("me").reach_mm;
-  // cos(a) + (R / reach) cos(a - start) is greatest
+  const double reach_mm = FindSiteRule("me").reach_mm;
+  // The angle a that maximises cos(a) + (R / reach) cos(a - start).
   const double share = kRadius_mm / reach_mm;
   const double angle = std::atan2(share * std::sin(start), 1 + share * std::cos(start));
   EXPECT_LT((found.point - OnBall({0, -std::sin(angle), -std::cos(angle)})).norm(), 1.2);

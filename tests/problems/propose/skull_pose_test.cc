@@ -72,7 +72,7 @@ TEST(SkullPose, TheSameSkullIsFoundInAnyPose) {
   for (int trial = 0; trial < 2; ++trial) {
     const Similarity truth = AnyPose(random);
     const SkullPose pose = FindPose(reference, PhantomShell(5, truth), 1);
-    EXPECT_EQ(ComplaintAbout(pose), "");
+    EXPECT_EQ(PoseFault(pose), "");
     for (const Vec3& p : {Vec3(0, 0, 0), Vec3(50, 70, -85), Vec3(-30, 10, 44)}) {
       EXPECT_LT((pose.skull_from_reference * p - truth * p).norm(), 20) << trial;
     }
@@ -81,8 +81,8 @@ TEST(SkullPose, TheSameSkullIsFoundInAnyPose) {
 
 TEST(SkullPose, ABallLiesInNoPose) {
   const SkullShell ball = AsShell(testing::SphereMesh(Vec3::Zero(), 90, 40));
-  EXPECT_THAT(ComplaintAbout(FindPose(PhantomShell(1), ball, 1)),
-              HasSubstr("does not say how it lies"));
+  EXPECT_THAT(PoseFault(FindPose(PhantomShell(1), ball, 1)),
+              HasSubstr("does not determine its pose"));
 }
 
 TEST(SkullPose, ANeedleIsNoSkull) {
@@ -90,7 +90,7 @@ TEST(SkullPose, ANeedleIsNoSkull) {
   for (Vec3& p : needle.points) {
     p = p.cwiseProduct(Vec3(0.1, 0.1, 1));
   }
-  EXPECT_THAT(ComplaintAbout(FindPose(PhantomShell(1), AsShell(needle), 1)),
+  EXPECT_THAT(PoseFault(FindPose(PhantomShell(1), AsShell(needle), 1)),
               HasSubstr("no pose brings it"));
 }
 

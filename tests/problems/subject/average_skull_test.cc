@@ -18,7 +18,7 @@ namespace {
 const Similarity kPose = {
     1.1, Eigen::AngleAxisd(0.4, Vec3(1, 2, 3).normalized()).toRotationMatrix(), {10, -20, 300}};
 
-// The average skull's sites in a pose, each off by a millimetre or two.
+// The sites of the average skull in a pose, each moved by a millimetre or two.
 std::vector<SitePoint> Posed(bool mirrored = false) {
   Random random(7);
   std::vector<SitePoint> sites;
@@ -51,7 +51,7 @@ TEST(AverageSkull, IsSymmetricWithNasionAtTheOrigin) {
   EXPECT_THROW(AverageSite("elbow"), InputError);
 }
 
-TEST(AverageSkull, APoseIsFoundThoughAThirdOfTheSitesAreWrong) {
+TEST(AverageSkull, FindsThePoseWithAThirdOfTheSitesWrong) {
   const SkullFit clean = FitAverageSkull(Posed());
   EXPECT_NEAR(clean.skull_from_average.scale, kPose.scale, 0.02);
   std::vector<SitePoint> sites = Posed();
@@ -65,7 +65,7 @@ TEST(AverageSkull, APoseIsFoundThoughAThirdOfTheSitesAreWrong) {
   }
 }
 
-TEST(AverageSkull, AMirrorImageFitsTheMirroredSkullAlone) {
+TEST(AverageSkull, AMirrorImageFitsOnlyTheMirroredSkull) {
   const SkullFit as_is = FitAverageSkull(Posed(true));
   const SkullFit mirrored = FitAverageSkull(Posed(true), Handedness::kMirrored);
   EXPECT_LT(mirrored.median_mm, 4);

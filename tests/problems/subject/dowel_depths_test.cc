@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "problems/config/config.h"
+#include "problems/subject/dowel_placement.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
@@ -71,7 +72,7 @@ TEST(TissueOptions, AreReadFromAConfiguration) {
   EXPECT_EQ(place.normal_radius_mm, 3);
 }
 
-TEST(FillDepths, TakesTheTablesCellsForBothSides) {
+TEST(FillDepths, UsesTheTablesCellsForBothSides) {
   Subject s({"sg", "go_l", "go_r"});
   EXPECT_THAT(
       FillDepths(FromTable("rhine_caucasoid", Sex::kFemale, Build::kObese), s.file, s.dowels),
@@ -80,14 +81,14 @@ TEST(FillDepths, TakesTheTablesCellsForBothSides) {
   EXPECT_TRUE(std::isnan(s.dowels[0].sd_mm));
 }
 
-TEST(FillDepths, TakesTheDeviationWhereTheTableHasOne) {
+TEST(FillDepths, UsesTheDeviationIfTheTableHasOne) {
   Subject s({"g", "go_l"});
   FillDepths(FromTable("t_table_2023", Sex::kMale, Build::kNormal), s.file, s.dowels);
   EXPECT_THAT(s.Depths(), ElementsAre(5.5, 12.5));
   EXPECT_EQ(s.dowels[1].sd_mm, 6);
 }
 
-TEST(FillDepths, AddsDeviationsWhereTheTableStatesThem) {
+TEST(FillDepths, AddsDeviationsIfTheTableHasThem) {
   Subject s({"g", "go_l"});
   TissueOptions options = FromTable("t_table_2023", Sex::kMale, Build::kNormal);
   options.sds = -1;
@@ -100,7 +101,7 @@ TEST(FillDepths, AddsDeviationsWhereTheTableStatesThem) {
   EXPECT_THAT(s.Depths()[1], 17.5);
 }
 
-TEST(FillDepths, SaysThatASuspectCellIsUsed) {
+TEST(FillDepths, NotesThatASuspectCellIsUsed) {
   Subject s({"n", "g"});
   EXPECT_THAT(
       FillDepths(FromTable("rhine_sw_indian", Sex::kMale, Build::kNormal), s.file, s.dowels),
@@ -112,8 +113,8 @@ TEST(FillDepths, SaysThatASuspectCellIsUsed) {
   EXPECT_EQ(s.dowels[0].depth_mm, 6.86);
 }
 
-// Of the rows used sM2 is out of order for women, n for both, go for nobody.
-TEST(FillDepths, SaysWhichRowsUsedDoNotGrowWithTheBuild) {
+// Among the rows used, sM2 is out of order for women, n for both sexes, and go for neither.
+TEST(FillDepths, NotesUsedRowsThatDoNotGrowWithTheBuild) {
   Subject s({"n", "sM2_l", "sM2_r", "go_l"});
   TissueOptions options = FromTable("rhine_black", Sex::kFemale, Build::kNormal);
   EXPECT_THAT(FillDepths(options, s.file, s.dowels), ElementsAre(HasSubstr("to obese at n, sM2;")));
@@ -137,7 +138,7 @@ TEST(FillDepths, ASiteThatTheTableLacksIsLeftOutUnlessSet) {
   EXPECT_THAT(set.Depths(), ElementsAre(2.5, 10, 10));
 }
 
-TEST(FillDepths, ASecondTableFillsWhatTheFirstLacksAndNothingElse) {
+TEST(FillDepths, ASecondTableFillsOnlyWhatTheFirstLacks) {
   Subject s({"g", "sg", "fe_l", "go_l"});
   TissueOptions options = FromTable("t_table_2023", Sex::kMale, Build::kNormal);
   options.fill_from = kTables + std::string("rhine_caucasoid.yaml");
@@ -150,15 +151,31 @@ TEST(FillDepths, ASecondTableFillsWhatTheFirstLacksAndNothingElse) {
   EXPECT_THAT(TablesOf(options), ElementsAre(options.table, options.fill_from));
 }
 
-TEST(FillDepths, ASidesOwnDepthComesBeforeThatOfThePair) {
+TEST(FillDepths, ADepthOfOneSidePrecedesThatOfThePair) {
   Subject s({"go_l", "go_r", "g"});
   TissueOptions options = Measured();
   options.set_mm = {{"go", 12}, {"go_l", 14}, {"me", 7}};
   EXPECT_THAT(FillDepths(options, s.file, s.dowels),
               ElementsAre("site go_l (Gonion): depth set to 14 mm by hand",
                           "site go_r (Gonion): depth set to 12 mm by hand",
-                          "set_mm: no dowel takes the depth of site me (Beneath Chin)"));
+                          "set_mm: no dowel uses the depth of site me (Beneath Chin)"));
   EXPECT_THAT(s.Depths(), ElementsAre(14, 12, 3));
+}
+
+// One pass over both lists equals a pass over each, in depths and in the notes about the used
+// dowels.
+TEST(FillDepths, FillsAllAndUsedDowelsAtOnce) {
+  TissueOptions options = FromTable("t_table_2023", Sex::kMale, Build::kNormal);
+  options.fill_from = kTables + std::string("rhine_caucasoid.yaml");
+  options.sds = 1;
+  options.set_mm = {{"me", 7}, {"go", 12}};
+  Subject all({"g", "sg", "me", "fe_l", "go_l", "zy_l", "mmb_l"}), used({"sg", "go_l", "zy_l"});
+  Subject all_alone = all, used_alone = used;
+  FillDepths(options, all.file, all_alone.dowels);
+  const std::vector<std::string> notes = FillDepths(options, all.file, used_alone.dowels);
+  EXPECT_EQ(FillDepths(options, all.file, all.dowels, used.dowels), notes);
+  EXPECT_EQ(all.Depths(), all_alone.Depths());
+  EXPECT_EQ(used.Depths(), used_alone.Depths());
 }
 
 TEST(FillDepths, RefusesToSetAnUnknownSiteOrNoDepth) {
@@ -175,7 +192,7 @@ TEST(FillDepths, RefusesToSetAnUnknownSiteOrNoDepth) {
 TEST(FillDepths, NeedsATable) {
   Subject s({"g"});
   EXPECT_EQ(WordsOf<InputError>([&] { FillDepths({}, s.file, s.dowels); }),
-            "tissue depths come from a table, but none is given; set `table` to a file such as "
+            "tissue depths come from a table, but no table is named; set `table` to a file such as "
             "configs/tables/rhine_caucasoid.yaml, or `depths: measured`");
 }
 
@@ -187,7 +204,7 @@ TEST(FillDepths, MeasuredFallsBackToTheClosestSkinAndDropsTheRest) {
   EXPECT_THAT(
       FillDepths(Measured(), s.file, s.dowels),
       ElementsAre("site go_l (Gonion): no depth along the normal; 11.25 mm to the closest skin "
-                  "taken instead",
+                  "used instead",
                   "site me (Beneath Chin): no measured depth; dowel dropped"));
   EXPECT_THAT(s.Depths(), ElementsAre(1, 11.25));
   EXPECT_EQ(s.dowels[1].site, "go_l");

@@ -49,9 +49,9 @@ TEST(ExtraSites, AreReadAndWrittenBack) {
   EXPECT_EQ(WriteConfig(ReadConfigText<Sites>(written, "b.yaml")), written);
 }
 
-TEST(ExtraSites, WhatIsWrongIsToldInOneLine) {
+TEST(ExtraSites, AFaultIsOneLine) {
   EXPECT_THAT(Words("a: {near: [1, 2, 3], uv: [0.5, 0.5], depth: 3}"),
-              HasSubstr("sites.a.near: where the site is appears twice"));
+              HasSubstr("sites.a.near: the place of the site is given twice"));
   EXPECT_THAT(Words("n: {uv: [0.5, 1.2]}"), HasSubstr("sites.n.uv[1]: "));
   EXPECT_THAT(Words("a: {near: g, depth: -1}"), HasSubstr("sites.a.depth: "));
   EXPECT_THAT(Words("a: {near: gg, depth: 1}"), HasSubstr("sites.a.near: unknown site 'gg'"));
@@ -71,7 +71,7 @@ TEST(ExtraSites, ANameThatIsNoSiteNeedsAPlace) {
   EXPECT_THAT(fault("nn: {depth: 3}"),
               AllOf(HasSubstr("nn: unknown site 'nn'"), HasSubstr("needs `near` or `uv`")));
   EXPECT_THAT(fault("go: {uv: [0.5, 0.5]}"), HasSubstr("write 'go_l' or 'go_r'"));
-  EXPECT_THAT(fault("n: {}"), HasSubstr("nothing is said of the site"));
+  EXPECT_THAT(fault("n: {}"), HasSubstr("the site has no options"));
 }
 
 TEST(PointNear, IsThePointTheLandmarkOrTheMiddleOfSeveral) {

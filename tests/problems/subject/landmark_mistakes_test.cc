@@ -10,7 +10,7 @@
 #include <numbers>
 
 #include "problems/subject/average_skull.h"
-#include "problems/subject/jaw_pose.h"
+#include "problems/subject/mandible.h"
 #include "problems/subject/phantom.h"
 
 namespace semblance {
@@ -42,7 +42,7 @@ Subject PhantomSubject() {
   return subject;
 }
 
-// The landmarks of a real head, and of its skull a speck of bone at each.
+// The landmarks of a real head, and instead of its skull a speck of bone at each landmark.
 Subject RealSubject(const std::string& name) {
   Subject subject;
   subject.file = ReadLandmarks(SEMBLANCE_SOURCE_DIR "/configs/landmarks/" + name + ".yaml").file;
@@ -119,23 +119,23 @@ const Mistake kMistakes[] = {
        MoveSites(s, OtherAxes);
        MoveSkull(s, OtherAxes);
      },
-     {"the face looks to +y", "x and y negated", "are RAS; say `axes: RAS`"},
+     {"the face looks to +y", "x and y negated", "are RAS; write `axes: RAS`"},
      1},
     {"landmarks in RAS",
      [](Subject& s) { MoveSites(s, OtherAxes); },
-     {"further than 3 mm from the skull", "x and y negated they fit within", "say `axes: RAS`"},
+     {"farther than 3 mm from the skull", "x and y negated they fit within", "write `axes: RAS`"},
      1},
     {"skull in RAS",
      [](Subject& s) { MoveSkull(s, OtherAxes); },
-     {"x and y negated they fit within", "say `axes: RAS`"},
+     {"x and y negated they fit within", "write `axes: RAS`"},
      1},
     {"landmarks in metres",
      [](Subject& s) { MoveSites(s, [](const Vec3& p) { return Vec3(p / 1000); }); },
-     {"multiplied by 1000 they fit within", "say `units: m`"},
+     {"multiplied by 1000 they fit within", "write `units: m`"},
      1},
     {"landmarks in inches",
      [](Subject& s) { MoveSites(s, [](const Vec3& p) { return Vec3(p / 25.4); }); },
-     {"multiplied by 25.4 they fit within", "say `units: in`"},
+     {"multiplied by 25.4 they fit within", "write `units: in`"},
      1},
     {"landmarks of the mirrored volume",
      [](Subject& s) {
@@ -182,7 +182,7 @@ const Mistake kMistakes[] = {
      1},
 };
 
-TEST(LandmarkMistakes, EachGetsItsWords) {
+TEST(LandmarkMistakes, EachHasItsMessage) {
   for (const Mistake& mistake : kMistakes) {
     for (Subject subject : Sound()) {
       if (std::string(mistake.name) == "landmarks of the mirrored volume" &&
@@ -224,12 +224,12 @@ void OpenMouth(Subject& s, double opening_deg) {
   }
 }
 
-TEST(LandmarkMistakes, AnOpenMandibleIsToldOnceWithItsAngle) {
+TEST(LandmarkMistakes, AnOpenMandibleIsReportedOnceWithItsAngle) {
   for (Subject subject : {RealSubject("cthead"), RealSubject("vhm")}) {
     OpenMouth(subject, 30);
     EXPECT_THAT(Find(subject).errors,
                 ElementsAre(AllOf(HasSubstr("the mandible is open by "),
-                                  HasSubstr("at most 15 are taken (max_opening_deg)"),
+                                  HasSubstr("at most 15 are allowed (max_opening_deg)"),
                                   HasSubstr("close it (`subject: {mandible: {mesh: ..., "))))
         << subject.file.subject;
   }
@@ -252,7 +252,7 @@ void RemoveMandible(Subject& s) {
   s.skull = Submesh(s.skull, keep);
 }
 
-TEST(LandmarkMistakes, AMissingMandibleIsToldOnce) {
+TEST(LandmarkMistakes, AMissingMandibleIsReportedOnce) {
   for (Subject subject : {RealSubject("cthead"), RealSubject("vhm")}) {
     RemoveMandible(subject);
     std::erase_if(subject.file.landmarks, [](const Landmark& l) {  // those near it

@@ -11,7 +11,7 @@
 #include <sstream>
 
 #include "interp/evaluation/variogram.h"
-#include "problems/subject/averaged_normal.h"
+#include "problems/subject/dowel_placement.h"
 #include "problems/subject/phantom_shape.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
@@ -22,7 +22,7 @@
 namespace semblance {
 namespace {
 
-// The areas of the thesis' network, right side, by its numbers of the sites.
+// The areas of the right side of the thesis's network, by the thesis's numbers of the sites.
 constexpr const char* kAreas =
     "1 11 12 1 12 2 2 12 3 3 12 13 3 13 4 4 13 14 4 14 5 5 14 19 5 19 6 6 19 20 6 20 7 7 20 21 "
     "7 21 8 8 21 9 9 21 18 9 18 10 11 15 12 12 15 13 13 15 14 14 15 16 14 16 19 16 20 19 16 17 20 "
@@ -49,7 +49,7 @@ std::vector<std::uint8_t> Bytes(const Phantom& p) {
   return bytes;
 }
 
-// The sites' bases joined by the areas of both sides.
+// A mesh of the sites' bases joined by the areas of both sides.
 TriMesh SiteMesh(const Phantom& p) {
   std::map<std::string, int> index;
   TriMesh mesh;
@@ -67,7 +67,8 @@ TriMesh SiteMesh(const Phantom& p) {
   return mesh;
 }
 
-// The sites' depths, linear over the area through which the ray to `vertex` leaves; NaN if none.
+// The depth interpolated linearly over the area through which the ray to `vertex` leaves; NaN if
+// there is none.
 double InterpolatedDepth(const Phantom& p, const TriMesh& sites, const MeshQuery& query,
                          const Vec3& vertex) {
   const auto hit = query.FirstHit(p.centre, vertex - p.centre, 400);
@@ -104,7 +105,7 @@ TEST_P(PhantomOfSeed, SkullIsClosedAndOutwardAndOfAdultSize) {
   const EdgeReport edges = CheckEdges(skull);
   EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0);
   EXPECT_EQ(ConnectedComponents(skull).count, 1);
-  // One closed surface of the sphere's kind: Euler's number is 2.
+  // Euler's number 2: one closed surface with the topology of a sphere.
   EXPECT_EQ(static_cast<std::int64_t>(skull.points.size()) - edges.edges +
                 static_cast<std::int64_t>(skull.triangles.size()),
             2);
@@ -282,7 +283,7 @@ TEST_P(PhantomLikePeople, TheSkinLiesOutsideOfTheBone) {
   }
 }
 
-TEST_P(PhantomLikePeople, DepthsAreWhatLiesAlongTheNormals) {
+TEST_P(PhantomLikePeople, DepthsAreMeasuredAlongTheNormals) {
   const MeshQuery skin(phantom_.face);
   const std::vector<Vec3> normals = VertexNormals(phantom_.skull);
   const auto along = [&](const Vec3& base, const Vec3& normal) {
@@ -296,7 +297,7 @@ TEST_P(PhantomLikePeople, DepthsAreWhatLiesAlongTheNormals) {
   }
 }
 
-TEST_P(PhantomLikePeople, SitesStandOnTheBoneAndFaceAsItDoesAround) {
+TEST_P(PhantomLikePeople, SitesLieOnTheBoneAndFaceAsItDoesAround) {
   const Phantom fine = MakePhantom(LikePeople(static_cast<std::uint64_t>(GetParam()), 200));
   const MeshQuery bone(fine.skull);
   ASSERT_EQ(fine.sites.size(), 32u);
@@ -310,8 +311,8 @@ TEST_P(PhantomLikePeople, SitesStandOnTheBoneAndFaceAsItDoesAround) {
   }
 }
 
-// Half the mean squared difference of the face's depths some way apart: of people it grows about as
-// the distance does, of a smooth field as its square.
+// Compares the variogram of the face's depths. In people it grows roughly with the distance, in a
+// smooth field with the square of the distance.
 TEST_P(PhantomLikePeople, DepthsAreAsRoughAsThoseOfPeople) {
   const Phantom smooth =
       MakePhantom({.random_seed = static_cast<std::uint64_t>(GetParam()), .rings = 60});
@@ -331,11 +332,68 @@ TEST_P(PhantomLikePeople, DepthsAreAsRoughAsThoseOfPeople) {
   EXPECT_LT(unlike_mm2(phantom_, 1), 25);
 }
 
-TEST(PhantomLikePeopleOfASeed, IsTheSameToTheByteAndNoOtherSeeds) {
+TEST(PhantomLikePeopleOfASeed, HasTheSameBytesAndDiffersForOtherSeeds) {
   const std::vector<std::uint8_t> bytes = Bytes(MakePhantom(LikePeople(7, 30)));
   EXPECT_EQ(bytes, Bytes(MakePhantom(LikePeople(7, 30))));
   EXPECT_NE(bytes, Bytes(MakePhantom(LikePeople(8, 30))));
 }
 
+constexpr RoughnessOptions kField{.sd = 3, .length_mm = 20, .shortest_mm = 4, .radius_mm = 90};
+
+// The mean over many fields of the product of the values at two directions apart_mm apart.
+double Covariance(double apart_mm, const RoughnessOptions& options) {
+  constexpr int kFields = 200, kPairs = 20;
+  Random random(1);
+  double sum = 0;
+  for (int i = 0; i < kFields; ++i) {
+    const WaveSum field = DrawRoughness(options, random);
+    for (int k = 0; k < kPairs; ++k) {
+      const Vec3 a = random.Direction(), aside = a.unitOrthogonal();
+      sum += field.Value(a) * field.Value(a + apart_mm / options.radius_mm * aside);
+    }
+  }
+  return sum / (kFields * kPairs);
+}
+
+TEST(Roughness, HasTheExponentialCovariance) {
+  for (const double apart_mm : {0.0, 5.0, 10.0, 20.0, 40.0}) {
+    EXPECT_NEAR(Covariance(apart_mm, kField), 9 * std::exp(-apart_mm / 20), 0.7) << apart_mm;
+  }
+}
+
+TEST(Roughness, HasNoWaveShorterThanTheLimit) {
+  Random random(2);
+  for (const WaveSum::Wave& w : DrawRoughness(kField, random).waves) {
+    EXPECT_LE(w.wave_number.norm() / kField.radius_mm, 2 * std::acos(-1) / kField.shortest_mm);
+  }
+}
+
+TEST(PhantomRelief, LeavesTwoMillimetresAndThickensWithTheSmoothTissue) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    Random random(seed);
+    const PhantomRelief relief(random);
+    EXPECT_GT(relief.Weight(), 0.7);
+    EXPECT_LT(relief.Weight(), 1.3);
+    for (int i = 0; i < 1000; ++i) {
+      const Vec3 direction = random.Direction();
+      EXPECT_GT(relief.Thickness(direction, 0.01), 2);
+      EXPECT_LT(relief.Thickness(direction, 5), relief.Thickness(direction, 8));
+    }
+  }
+}
+
+TEST(PhantomRelief, TissueIsThickBesideTheTeethAndThinOverTheNasalBones) {
+  double hollow_mm = 0, ridge_mm = 0;
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    Random random(seed);
+    const PhantomRelief relief(random);
+    hollow_mm += relief.Thickness(PhantomDirection({37, 28, -62}), 10) / 20;
+    ridge_mm += relief.Thickness(PhantomDirection({0, -10, -21}), 10) / 20;
+  }
+  EXPECT_GT(hollow_mm, 18);
+  EXPECT_LT(ridge_mm, 10);
+}
+
 }  // namespace
+
 }  // namespace semblance

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/subject/sites.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -42,14 +43,14 @@ TEST(Sites, TheMirrorOfAMirrorIsTheSite) {
   }
 }
 
-TEST(Sites, AreNamedInWords) {
+TEST(Sites, AreDescribedWithTheirName) {
   EXPECT_EQ(SiteInWords("zy_r"), "zy_r (Zygomatic Arch, midway)");
   EXPECT_EQ(SiteInWords("go"), "go (Gonion)");
   EXPECT_EQ(SiteInWords("mmb_l"), "mmb_l (Mid-mandibular border)");
   EXPECT_EQ(SiteInWords("mine"), "mine");
 }
 
-TEST(Sites, TheFurtherOnesAreTheTablesOwn) {
+TEST(Sites, FurtherSitesAreThoseOfTheTables) {
   EXPECT_EQ(FurtherSites().size(), 13u);
   for (const Site& site : FurtherSites()) {
     EXPECT_TRUE(IsFurtherSite(site.code) && !IsStandardSite(site.code)) << site.code;
@@ -59,9 +60,9 @@ TEST(Sites, TheFurtherOnesAreTheTablesOwn) {
   EXPECT_THAT(ComplaintAboutLandmark("mmb"), HasSubstr("write 'mmb_l' or 'mmb_r'"));
 }
 
-TEST(Sites, AComplaintSaysWhatToWrite) {
+TEST(Sites, AFaultSaysWhatToWrite) {
   EXPECT_EQ(ComplaintAboutSite("go_l"), "");
-  EXPECT_EQ(ComplaintAboutSite("go"), "site 'go' stands on both sides; write 'go_l' or 'go_r'");
+  EXPECT_EQ(ComplaintAboutSite("go"), "site 'go' is on both sides; write 'go_l' or 'go_r'");
   EXPECT_THAT(ComplaintAboutSite("gp_l"), HasSubstr("unknown site 'gp_l'"));
 }
 
@@ -76,5 +77,47 @@ TEST(Sites, EachIsFoundByItsCodeAndIsTheMirrorOfItsMirror) {
   EXPECT_EQ(MirrorOf("mine"), "");
 }
 
+using ::testing::HasSubstr;
+
+TEST(FindSiteByName, EveryCodeNumberAndPrintedNameIsItsSite) {
+  for (const Site& site : StandardSites()) {
+    const std::string side = site.side == Side::kLeft ? "l" : site.side == Side::kRight ? "r" : "";
+    EXPECT_EQ(FindSiteByName(site.code).code, site.code);
+    EXPECT_EQ(FindSiteByName(fmt::format("{}{}", site.number, side)).code, site.code);
+    EXPECT_EQ(FindSiteByName(fmt::format("{} {}", site.name, side)).code, site.code) << site.name;
+  }
+}
+
+TEST(FindSiteByName, FindsFurtherSites) {
+  for (const Site& site : FurtherSites()) {
+    const std::string side = site.side == Side::kLeft ? "l" : site.side == Side::kRight ? "r" : "";
+    EXPECT_EQ(FindSiteByName(site.code).code, site.code);
+    EXPECT_EQ(FindSiteByName(fmt::format("{} {}", site.name, side)).code, site.code) << site.name;
+  }
+  EXPECT_EQ(FindSiteByName("SC left").code, "sC_l");
+}
+
+TEST(FindSiteByName, AcceptsTheSideBeforeOrAfterInAnyCase) {
+  for (const char* name : {"left gonion", "Gonion (L)", "GONION LEFT", "go_L", "L go", "18l",
+                           "18_l", "left-gonion", "  go.l "}) {
+    EXPECT_EQ(FindSiteByName(name).code, "go_l") << name;
+  }
+  EXPECT_EQ(FindSiteByName("right supra m2").code, "sM2_r");
+  EXPECT_EQ(FindSiteByName("SM2_R").code, "sM2_r");
+  EXPECT_EQ(FindSiteByName("rhinion").code, "rhi");
+}
+
+TEST(FindSiteByName, StatesTheFault) {
+  EXPECT_THAT(FindSiteByName("gonion").fault, HasSubstr("is on both sides"));
+  EXPECT_THAT(FindSiteByName("18").fault, HasSubstr("'go_l' or 'go_r'"));
+  EXPECT_THAT(FindSiteByName("left nasion").fault, HasSubstr("lies in the midline; write 'n'"));
+  EXPECT_THAT(FindSiteByName("nasoin").fault, HasSubstr("did you mean 'Nasion'?"));
+  for (const char* name : {"", " ", "F-1", "22", "0", "l", "left"}) {
+    EXPECT_EQ(FindSiteByName(name).code, "") << name;
+    EXPECT_THAT(FindSiteByName(name).fault, HasSubstr("is not a site")) << name;
+  }
+}
+
 }  // namespace
+
 }  // namespace semblance

@@ -30,7 +30,7 @@ TissueTable Shipped(const std::string& id) {
   return ReadTissueTable(fmt::format("{}/configs/tables/{}.yaml", SEMBLANCE_SOURCE_DIR, id));
 }
 
-// The thesis's columns in their order.
+// The columns of the thesis in their order.
 std::vector<std::string> Columns() {
   return {kEmaciatedMale,  "emaciated_female", "normal_male",
           "normal_female", "obese_male",       "obese_female"};
@@ -49,7 +49,7 @@ PrintedCell ParseCell(std::string text) {
   return cell;
 }
 
-// All rows "| number | name | six cells |" of the thesis's appendix A: 3 tables of 21.
+// All rows "| number | name | six cells |" of the thesis's appendix A: 3 tables of 21 rows.
 std::vector<std::vector<PrintedCell>> PrintedRows() {
   std::ifstream thesis(SEMBLANCE_SOURCE_DIR "/../shared/thesis.md");
   std::vector<std::vector<PrintedCell>> rows;
@@ -139,7 +139,7 @@ TEST(TissueTable, SubM2OfCaucasoids) {
   }
 }
 
-TEST(TissueTable, SaysWhyASiteHasNoDepth) {
+TEST(TissueTable, StatesWhyASiteHasNoDepth) {
   const TissueTable table = Shipped("rhine_caucasoid");
   EXPECT_EQ(FindDepth(table, Sex::kFemale, Build::kEmaciated, "iM2_l"), std::nullopt);
   EXPECT_EQ(WhyNoDepth(table, Sex::kFemale, Build::kEmaciated, "iM2_l"),
@@ -226,11 +226,11 @@ TEST(TissueTable, RefusesWhatIsNotATable) {
   EXPECT_THAT(words(OneRow("{adult: {mean: 3}}") + "  - {site: g, values: {adult: {mean: 3}}}\n"),
               HasSubstr("site 'g' appears twice"));
   EXPECT_THAT(words("id: x\nrows: [{site: go_l, values: {adult: {mean: 3}}}]\n"),
-              HasSubstr("a pair stands once"));
+              HasSubstr("list a pair once"));
   EXPECT_THAT(words(""), HasSubstr("rows"));
 }
 
-TEST(TissueTable, RefusesAFileThatIsNotThere) {
+TEST(TissueTable, RefusesAMissingFile) {
   EXPECT_THROW(ReadTissueTable("/no/such/table.yaml"), IoError);
 }
 

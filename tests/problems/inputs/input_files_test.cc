@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What `check` finds in the inputs that an experiment names.
-#include "problems/inputs/input_check.h"
+// The findings of `semblance check` in the inputs that an experiment names.
+#include "problems/inputs/input_files.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -10,7 +10,6 @@
 #include <regex>
 #include <string>
 
-#include "problems/inputs/input_files.h"
 #include "problems/pipeline/experiment_config.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -54,7 +53,7 @@ TEST_F(InputCheckTest, ASoundExperimentHasNoFault) {
   EXPECT_THAT(found.faults, IsEmpty());
 }
 
-TEST_F(InputCheckTest, AllFaultsOfAllInputsAreToldALineEach) {
+TEST_F(InputCheckTest, AllFaultsOfAllInputsAreReportedALineEach) {
   const CheckFindings found = Look(
       "subject: {type: files, skull: broken.ply, skin: none.ply, landmarks: broken.yaml}\n"
       "network: broken.yaml\ntissue: {table: none.yaml}\nedits: none_edits.yaml\n"
@@ -81,7 +80,7 @@ TEST_F(InputCheckTest, LandmarksAreLaidOnTheBone) {
   EXPECT_THAT(with_table.faults, Contains(HasSubstr("mm from the skull")));
 }
 
-TEST_F(InputCheckTest, WhatATableDoesNotCoverIsSaid) {
+TEST_F(InputCheckTest, WarnsOfSitesThatATableLacks) {
   const CheckFindings found = Look(fmt::format(
       "base: {}/phantom.yaml\ntissue: {{depths: table, table: {}/tables/rhine_caucasoid.yaml, "
       "build: emaciated}}\n",
@@ -90,7 +89,7 @@ TEST_F(InputCheckTest, WhatATableDoesNotCoverIsSaid) {
   EXPECT_THAT(found.warnings, Contains(HasSubstr("no depth for 2 of the 32 landmarks")));
 }
 
-TEST_F(InputCheckTest, WhatRulesAndSitesSayOfAPhantomIsLookedAt) {
+TEST_F(InputCheckTest, RulesAndSitesOfAPhantomAreChecked) {
   const std::string base =
       fmt::format("base: {}/phantom.yaml\nsubject: {{type: phantom, rings: 20}}\n", kConfigs);
   EXPECT_THAT(Look(base + "rules: {points: {uc_l: [18000, 0, -60]}}\n").faults,
@@ -105,7 +104,7 @@ TEST_F(InputCheckTest, WhatRulesAndSitesSayOfAPhantomIsLookedAt) {
               Contains(HasSubstr("rounds: `face: placed` does not use it")));
 }
 
-TEST_F(InputCheckTest, ARuleThatDoesNotApplyIsTold) {
+TEST_F(InputCheckTest, WarnsOfARuleThatDoesNotApply) {
   const std::string base =
       fmt::format("base: {}/phantom.yaml\nsubject: {{type: phantom, rings: 20}}\n", kConfigs);
   const std::string asked = "rules: {mouth_width: {use: true}}\n";
@@ -117,7 +116,7 @@ TEST_F(InputCheckTest, ARuleThatDoesNotApplyIsTold) {
   EXPECT_THAT(Look(base + "template: ict\nface: prior\n").warnings, IsEmpty());
 }
 
-TEST_F(InputCheckTest, AKnownDepthIsOneWhereTheTableHasNone) {
+TEST_F(InputCheckTest, AKnownDepthReplacesAMissingOne) {
   const CheckFindings found = Look(fmt::format(
       "base: {0}/phantom.yaml\ntissue: {{depths: table, table: {0}/tables/t_table_2023.yaml, "
       "given: {{depths_mm: {{fe: 4}}}}}}\n",
@@ -127,7 +126,7 @@ TEST_F(InputCheckTest, AKnownDepthIsOneWhereTheTableHasNone) {
   EXPECT_THAT(found.warnings, Not(Contains(HasSubstr("fe_l"))));
 }
 
-TEST_F(InputCheckTest, AnInputIsToldOnceHoweverManyExperimentsNameIt) {
+TEST_F(InputCheckTest, AFaultOfAnInputIsReportedOnceForManyExperiments) {
   InputCheck check({});
   const Experiment experiment = Of("network: broken.yaml\n");
   CheckFindings all = check.Look(experiment);
@@ -137,8 +136,8 @@ TEST_F(InputCheckTest, AnInputIsToldOnceHoweverManyExperimentsNameIt) {
   EXPECT_THAT(all.faults, SizeIs(faults));
 }
 
-// Whatever option names a file, a file that is missing there is a fault.
-TEST_F(InputCheckTest, NoOptionMayNameAFileThatIsNotThere) {
+// A missing file is a fault, whichever option names it.
+TEST_F(InputCheckTest, NoOptionMayNameAMissingFile) {
   const std::regex word("none");
   for (const std::string text :
        {"network: none.x", "tissue: {table: none.x}", "edits: none.x",
@@ -157,7 +156,7 @@ TEST_F(InputCheckTest, NoOptionMayNameAFileThatIsNotThere) {
   }
 }
 
-// Those that other options depend on are read with the options.
+// The files on which other options depend are read with the options.
 TEST_F(InputCheckTest, TemplateAndBustAreReadWithTheOptions) {
   for (const char* text : {"template: {type: file, surface: none.x, sites: none.x}\n",
                            "bust: {type: hspline, file: none.x}\n",
@@ -166,7 +165,7 @@ TEST_F(InputCheckTest, TemplateAndBustAreReadWithTheOptions) {
   }
 }
 
-TEST_F(InputCheckTest, ATableThatGivesNoDepthIsNoInput) {
+TEST_F(InputCheckTest, AnUnusedTableIsNoInput) {
   EXPECT_THAT(NamedInputsOf(Of("tissue: {depths: measured, table: none.x}\n")), IsEmpty());
 }
 

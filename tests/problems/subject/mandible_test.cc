@@ -1,19 +1,78 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/preparation/hinge.h"
+#include "problems/subject/mandible.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <numbers>
 
 #include "problems/config/config.h"
-#include "problems/subject/jaw_pose.h"
+#include "problems/landmark_files/read_landmarks.h"
+#include "problems/subject/landmarks.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/random.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {
 namespace {
+
+// An average skull in another pose and size, with noise_mm of noise on its sites and an open jaw.
+std::vector<SitePoint> Skull(double opening_deg, double noise_mm, std::uint64_t random_seed = 1) {
+  const Vec3 hinge = (AverageCondyles()[0] + AverageCondyles()[1]) / 2;
+  const Mat3 turn =
+      Eigen::AngleAxisd(opening_deg * std::numbers::pi / 180, Vec3::UnitX()).toRotationMatrix();
+  const Similarity pose{
+      0.93, Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized()).toRotationMatrix(), {10, 20, 30}};
+  Random random(random_seed);
+  std::vector<SitePoint> sites;
+  for (const std::string& code : StandardSiteCodes()) {
+    const Vec3 closed = AverageSite(code);
+    const Vec3 open = IsOfMandible(code) ? Vec3(hinge + turn * (closed - hinge)) : closed;
+    sites.push_back({code, pose * (open + random.InBox(-noise_mm, noise_mm))});
+  }
+  return sites;
+}
+
+TEST(JawPose, IsTheHingesAngle) {
+  for (const double opening_deg : {-5.0, 0.0, 10.0, 30.0}) {
+    EXPECT_NEAR(FindJawPose(Skull(opening_deg, 0))->opening_deg, opening_deg, 1e-6);
+  }
+  EXPECT_NEAR(FindJawPose(Skull(0, 0))->off_mm, 0, 1e-6);
+}
+
+TEST(JawPose, ToleratesNoiseAndAWrongSite) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    std::vector<SitePoint> sites = Skull(20, 4, seed);
+    std::ranges::find(sites, "go_l", &SitePoint::site)->point += Vec3(0, 40, 30);
+    EXPECT_NEAR(FindJawPose(sites)->opening_deg, 20, 6) << seed;
+  }
+}
+
+TEST(JawPose, OfRealHeadsThatBiteIsSmall) {
+  for (const char* name : {"cthead", "vhm"}) {
+    std::vector<SitePoint> sites;
+    for (const Landmark& l :
+         ReadLandmarks(std::string(SEMBLANCE_SOURCE_DIR "/configs/landmarks/") + name + ".yaml")
+             .file.landmarks) {
+      sites.push_back({l.site, Vec3(l.point.data())});
+    }
+    EXPECT_LT(std::abs(FindJawPose(sites)->opening_deg), 10) << name;
+  }
+}
+
+TEST(JawPose, NeedsSitesOfBothJaws) {
+  std::vector<SitePoint> sites = Skull(0, 0);
+  std::erase_if(sites, [](const SitePoint& s) { return IsOfMandible(s.site); });
+  EXPECT_FALSE(FindJawPose(sites));
+}
+
+TEST(JawPose, TheCondylesMirrorEachOtherBehindTheFace) {
+  const auto [left, right] = AverageCondyles();
+  EXPECT_GT(left.x(), 40);
+  EXPECT_EQ(left, Vec3(-right.x(), right.y(), right.z()));
+}
 
 using ::testing::AllOf;
 using ::testing::ElementsAre;
@@ -43,12 +102,12 @@ Vec3 PointAt(LandmarkFile& file, const std::string& site) {
   return Vec3(At(file, site).point.data());
 }
 
-TEST(Hinge, NothingIsTheIdentityToTheBit) {
+TEST(Hinge, ZeroIsTheExactIdentity) {
   const Vec3 p(1.1, -2.3, -99.7);
   EXPECT_EQ(kHinge.Opened(p, 0), p);
 }
 
-TEST(Hinge, ThereAndBackIsTheIdentityAndTheAxisStays) {
+TEST(Hinge, OpeningAndClosingIsTheIdentityAndTheAxisStays) {
   for (const double opening_deg : {-20.0, 3.0, 45.0}) {
     for (const Vec3& p : {Vec3(0, 10, -112), Vec3(48, 71, -89), Vec3(-30, 38, -89)}) {
       EXPECT_LT((kHinge.Opened(kHinge.Opened(p, opening_deg), -opening_deg) - p).norm(), 1e-12);
@@ -66,7 +125,7 @@ TEST(Hinge, OpeningLowersTheChin) {
   EXPECT_GT(open.y(), chin.y());
 }
 
-TEST(Hinge, ABiteIsTheDistanceThatItSays) {
+TEST(Hinge, ABiteIsTheRequestedDistance) {
   const Vec3 pr(0.5, -1, -67), id(-0.5, 4, -91);
   for (const double bite_mm : {15.0, 24.5, 40.0, 60.0}) {
     const double opening_deg = OpeningForBite_deg(kHinge, pr, id, bite_mm);
@@ -78,7 +137,7 @@ TEST(Hinge, ABiteIsTheDistanceThatItSays) {
               HasSubstr("cannot be 900 mm apart"));
 }
 
-TEST(AddMandible, TurnsTheMandibleAndItsLandmarksAndNothingElse) {
+TEST(AddMandible, TurnsOnlyTheMandibleAndItsLandmarks) {
   LandmarkFile file = AverageLandmarks(), before = file;
   const TriMesh cranium = testing::SphereMesh({0, 60, 30}, 80, 6);
   const TriMesh jaw = testing::SphereMesh({0, 20, -100}, 30, 6);
@@ -116,11 +175,11 @@ TEST(AddMandible, WithoutAnAngleItOnlyAdds) {
   EXPECT_EQ(PointAt(file, "me"), PointAt(before, "me"));
 }
 
-TEST(MandibleOptions, WhatDoesNotGoTogetherIsToldAtItsLine) {
+TEST(MandibleOptions, ContradictionsAreReportedAtTheirLine) {
   const auto words = [](const std::string& text) {
     return WordsOf<ConfigError>([&] { ReadConfigText<MandibleOptions>(text, "a.yaml"); });
   };
-  EXPECT_THAT(words("{mesh: a.ply, opening_deg: 3, bite_mm: 30}"), HasSubstr("opened twice"));
+  EXPECT_THAT(words("{mesh: a.ply, opening_deg: 3, bite_mm: 30}"), HasSubstr("given twice"));
   EXPECT_THAT(words("{mesh: a.ply, condyle_left: [1, 2, 3]}"), HasSubstr("needs both condyles"));
   EXPECT_THAT(words("{opening_deg: 3}"), HasSubstr("there is no mesh to turn"));
   EXPECT_THAT(words("{mesh: a.ply, opening_deg: 90}"), HasSubstr("opening_deg"));
@@ -141,15 +200,16 @@ TEST(MandibleOptions, CondylesAreAnAxisFromRightToLeft) {
               HasSubstr("at least 40 mm"));
   const auto options = ReadConfigText<MandibleOptions>(
       "{mesh: a.ply, condyle_left: [50, 76, -38], condyle_right: [-48, 75, -40]}", "a.yaml");
-  EXPECT_EQ(HingeOf(options, {}).left, kHinge.left);
+  EXPECT_EQ(FindHinge(options, {}).left, kHinge.left);
 }
 
-TEST(Hinge, CondylesThatNoConfigurationHasCheckedAreRefusedToo) {
+TEST(Hinge, UncheckedCondylesAreRefusedToo) {
   MandibleOptions options;
   options.condyle_left = options.condyle_right = {50, 76, -38};
-  EXPECT_THAT(WordsOf<InputError>([&] { HingeOf(options, {}); }),
+  EXPECT_THAT(WordsOf<InputError>([&] { FindHinge(options, {}); }),
               HasSubstr("subject.mandible.condyle_left: the condyles are 0.0 mm apart"));
 }
 
 }  // namespace
+
 }  // namespace semblance
