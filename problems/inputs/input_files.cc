@@ -22,6 +22,7 @@
 #include "problems/prior/hspline_prior.h"
 #include "problems/subject/network_plan.h"
 #include "problems/subject/sites.h"
+#include "problems/pipeline/experiment_config.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

@@ -16,6 +16,7 @@
 #include "problems/subject/average_skull.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/sites.h"
+#include "problems/face_template/skin_distance.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"

@@ -84,7 +84,7 @@ std::vector<NamedExperiment> AlternativesIn(const std::filesystem::path& file,
 
 // What an alternative would be refused for ends the run before the long work, not after it. What
 // is wrong with the experiment itself the run will say.
-void CheckAlternatives(const std::filesystem::path& config, const Experiment& experiment,
+void RefuseFaultyAlternatives(const std::filesystem::path& config, const Experiment& experiment,
                        const std::vector<NamedExperiment>& named, StageCache& cache,
                        const RunContext& context) {
   if (named.empty()) {
@@ -113,7 +113,7 @@ int RunCommand(const Arguments& arguments) {
   StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string(), std::move(given));
   const RunContext context = ContextOf(arguments);
   StageCache cache(16);
-  CheckAlternatives(config, experiment, named, cache, context);
+  RefuseFaultyAlternatives(config, experiment, named, cache, context);
   const RunResult result = Run(experiment, context, &cache);
   std::vector<std::string> faults = result.Faults();
   std::ranges::copy(RunAlternatives(experiment, named, result, cache, folder.Files(), context),
