@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/volumes/voxel_array.h"
+#include "problems/volumes/ct_volume.h"
 
 namespace semblance::testing {
 
