@@ -199,6 +199,8 @@ VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGr
   return MakeMask(components, reached, grid);
 }
 
+// An exact distance transform, one axis after the other, because a squared distance is a sum over
+// the axes. The reach is short, so each axis simply tries all lines within reach.
 VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads) {
   const auto [columns, rows, slices] = grid.counts;
   const std::int64_t row = columns, slice = row * rows;

@@ -139,15 +139,13 @@ Reader MakeReader(VolumeFormat format) {
   }
 }
 
-// Called before memory is allocated for the voxels. If the header is a file of its own, the size of
-// the file with the voxels is unknown.
+// Called before memory is allocated for the voxels.
 void CheckClaim(const itk::ImageIOBase& io, const std::filesystem::path& file) {
-  const std::string ending = file.extension().string();
-  const bool detached = ending == ".nhdr" || ending == ".mhd" || ending == ".hdr";
-  VolumeClaim claim{
-      .counts = {1, 1, 1},
-      .bytes_per_voxel = static_cast<double>(io.GetComponentSize()),
-      .file_bytes = detached ? kNaN : static_cast<double>(std::filesystem::file_size(file))};
+  VolumeClaim claim{.counts = {1, 1, 1},
+                    .bytes_per_voxel = static_cast<double>(io.GetComponentSize()),
+                    .file_bytes = HasDetachedVoxels(file)
+                                      ? kNaN
+                                      : static_cast<double>(std::filesystem::file_size(file))};
   for (unsigned axis = 0; axis < std::min(3U, io.GetNumberOfDimensions()); ++axis) {
     claim.counts[axis] = static_cast<double>(io.GetDimensions(axis));
   }

@@ -19,6 +19,7 @@
 #include "problems/volumes/dicom_series.h"
 #include "problems/volumes/invesalius.h"
 #include "problems/volumes/itk_files.h"
+#include "problems/volumes/volume_headers.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/lower_case.h"
@@ -145,14 +146,12 @@ VoxelArray DecodeArray(std::string_view bytes) {
 constexpr double kWork_bytes = 512e6;
 
 // Enough memory for all voxels that the file can hold at the largest compression ratio of gzip,
-// three times: as read, as voxels, and as sent. If the header is a file of its own, the size of the
-// file with the voxels is unknown.
+// three times: as read, as voxels, and as sent.
 double MemoryFor_bytes(const fs::path& file) {
   constexpr double kMaxCompressionRatio = 1032, kCopies = 3;
-  const std::string ending = file.extension().string();
   std::error_code fault;
   const auto size = static_cast<double>(fs::file_size(file, fault));
-  const bool is_whole = !fault && ending != ".nhdr" && ending != ".mhd" && ending != ".hdr";
+  const bool is_whole = !fault && !HasDetachedVoxels(file);
   return kWork_bytes + kCopies * (is_whole ? std::min(kMaxCompressionRatio * size, kMaxVolume_bytes)
                                            : kMaxVolume_bytes);
 }

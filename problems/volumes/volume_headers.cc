@@ -356,6 +356,11 @@ HeaderPlace ParseMetaImagePlace(std::string_view head) {
   return place;
 }
 
+bool HasDetachedVoxels(const std::filesystem::path& file) {
+  const std::string ending = file.extension().string();
+  return ending == ".nhdr" || ending == ".mhd" || ending == ".hdr";
+}
+
 void ApplyPlace(const HeaderPlace& place, VoxelArray& array) {
   if (place.steps) {
     array.steps = *place.steps;

@@ -33,6 +33,9 @@ HeaderPlace ParseNrrdPlace(std::string_view head, const std::string& where);
 // ITK provides the steps of a MetaImage in LPS, but ignores their unit.
 HeaderPlace ParseMetaImagePlace(std::string_view head);
 
+// True if the file is only a header (.nhdr, .mhd, .hdr) and the voxels are in another file.
+bool HasDetachedVoxels(const std::filesystem::path& file);
+
 // Moves the voxels to the place of the header, and appends its notes.
 void ApplyPlace(const HeaderPlace& place, VoxelArray& array);
 

@@ -12,23 +12,29 @@ namespace {
 using ::testing::HasSubstr;
 using testing::WordsOf;
 
-// 5 x 6 x 7 voxels, turned and skew.
-CtVolume SkewVolume() {
+// 10 x 12 x 14 voxels of 1 x 1 x 1.5 mm, turned and skew.
+CtVolume MakeVolume(double (*hu)(const Vec3& voxel)) {
   CtVolume volume;
-  volume.columns = 5;
-  volume.rows = 6;
-  volume.slices = 7;
-  volume.spacing_mm = Vec3(1, 2, 3);
+  volume.columns = 10;
+  volume.rows = 12;
+  volume.slices = 14;
+  volume.spacing_mm = Vec3(1, 1, 1.5);
   volume.origin = Vec3(-20, 40, 100);
   volume.axes.col(0) = Vec3(1, 0.2, 0).normalized();
   volume.axes.col(1) = Vec3(-0.2, 1, 0.1).normalized();
   volume.axes.col(2) = Vec3(0, -0.4, 1).normalized();
-  volume.values.assign(5 * 6 * 7, 0);
+  for (int k = 0; k < volume.slices; ++k) {
+    for (int j = 0; j < volume.rows; ++j) {
+      for (int i = 0; i < volume.columns; ++i) {
+        volume.values.push_back(static_cast<std::int16_t>(hu(Vec3(i, j, k))));
+      }
+    }
+  }
   return volume;
 }
 
 TEST(CtVolume, VoxelAtInvertsWorld) {
-  const CtVolume volume = SkewVolume();
+  const CtVolume volume = MakeVolume([](const Vec3&) { return 0.0; });
   EXPECT_EQ(volume.World(0, 0, 0), volume.origin);
   for (const Vec3& at : {Vec3(0, 0, 0), Vec3(4, 5, 6), Vec3(1.25, 3.5, -2.75)}) {
     EXPECT_LT((volume.VoxelAt(volume.World(at.x(), at.y(), at.z())) - at).norm(), 1e-12);
@@ -36,15 +42,8 @@ TEST(CtVolume, VoxelAtInvertsWorld) {
 }
 
 TEST(CtVolume, SamplingIsTrilinear) {
-  CtVolume volume = SkewVolume();
   const auto linear = [](const Vec3& v) { return 10 * v.x() - 4 * v.y() + 7 * v.z() + 30; };
-  for (int k = 0; k < 7; ++k) {
-    for (int j = 0; j < 6; ++j) {
-      for (int i = 0; i < 5; ++i) {
-        volume.values[volume.Index(i, j, k)] = static_cast<std::int16_t>(linear(Vec3(i, j, k)));
-      }
-    }
-  }
+  const CtVolume volume = MakeVolume(linear);
   for (const Vec3& at :
        {Vec3(0, 0, 0), Vec3(4, 5, 6), Vec3(1.25, 3.5, 2.75), Vec3(3.9, 0.1, 5.5)}) {
     EXPECT_NEAR(SampleHu(volume, volume.World(at.x(), at.y(), at.z())), linear(at), 1e-9);
@@ -54,7 +53,7 @@ TEST(CtVolume, SamplingIsTrilinear) {
 
 TEST(CtVolume, AnUnusableVolumeIsAClearError) {
   const auto words = [](const auto& spoil) {
-    CtVolume volume = SkewVolume();
+    CtVolume volume = MakeVolume([](const Vec3&) { return 0.0; });
     spoil(volume);
     return WordsOf<InputError>([&] { CheckVolume(volume, "x"); });
   };
@@ -82,27 +81,6 @@ TEST(CtVolume, AnImpossibleClaimIsRefused) {
   EXPECT_THAT(words({.counts = {kNaN, 2, 2}}), HasSubstr("not a volume"));
   EXPECT_THAT(words({.counts = {0, 512, 512}}), HasSubstr("not a volume"));
   EXPECT_THAT(words({.counts = {512, 512, 100}, .file_bytes = 1000}), HasSubstr("cannot hold"));
-}
-
-// 10 x 12 x 14 voxels of 1 x 1 x 1.5 mm, turned and skew.
-CtVolume MakeVolume(double (*hu)(const Vec3& voxel)) {
-  CtVolume volume;
-  volume.columns = 10;
-  volume.rows = 12;
-  volume.slices = 14;
-  volume.spacing_mm = Vec3(1, 1, 1.5);
-  volume.origin = Vec3(-20, 40, 100);
-  volume.axes.col(0) = Vec3(1, 0.2, 0).normalized();
-  volume.axes.col(1) = Vec3(-0.2, 1, 0.1).normalized();
-  volume.axes.col(2) = Vec3(0, -0.4, 1).normalized();
-  for (int k = 0; k < volume.slices; ++k) {
-    for (int j = 0; j < volume.rows; ++j) {
-      for (int i = 0; i < volume.columns; ++i) {
-        volume.values.push_back(static_cast<std::int16_t>(hu(Vec3(i, j, k))));
-      }
-    }
-  }
-  return volume;
 }
 
 // The mean of a linear field over a voxel is its value at the centre of the voxel.
