@@ -393,8 +393,8 @@ VolumeReading ReadFile(const fs::path& path, const RunContext& context) {
   const std::optional<VolumeFormat> format = VolumeFormatOf(path);
   if (!format) {
     throw InputError(fmt::format(
-        "{}: not a kind of volume that is read; allowed are a folder of DICOM files (name the "
-        "folder, not a single slice), .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd and .inv3",
+        "{}: not a kind of volume that is read; allowed are a folder of DICOM files (for a "
+        "single slice name its folder), .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd and .inv3",
         where));
   }
   return Finish(ReadImageInChild(path, *format, context.stop_token), {}, where);
