@@ -5,7 +5,7 @@
 #include <string>
 
 #include "problems/compare/study_comparison.h"
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 
 namespace semblance {
 

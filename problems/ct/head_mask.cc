@@ -12,9 +12,10 @@
 namespace semblance {
 namespace {
 
-void RequireAny(const VoxelMask& mask, const std::string& complaint) {
+// Throws InputError with the message if the mask is empty.
+void RequireAny(const VoxelMask& mask, const std::string& message) {
   if (std::find(mask.begin(), mask.end(), 1) == mask.end()) {
-    throw InputError(fmt::format("import-ct: {}", complaint));
+    throw InputError(fmt::format("import-ct: {}", message));
   }
 }
 
@@ -24,11 +25,12 @@ VoxelMask LargestComponent(const VoxelMask& mask, const VoxelGrid& grid) {
   if (!keep.empty()) {
     keep[pieces.Largest()] = true;
   }
-  return MaskOf(pieces, keep, grid);
+  return MakeMask(pieces, keep, grid);
 }
 
-// Layers of air laid about a volume: on its four sides, where a table may come close, and above, so
-// that air reaches the vault of a head that ends just below. None below, where airways are cut.
+// Layers of air around a volume: on its four sides, because a table may be close to them, and
+// above, so that air reaches the vault of a head that ends just below the last slice. There is none
+// below, because the first slice may cut airways open.
 struct Padding {
   int columns = 0, rows = 0, above = 0;
 
@@ -54,7 +56,7 @@ struct Padding {
   }
 };
 
-// The four sides of a grid.
+// The voxels on the four sides of a grid.
 VoxelMask SideFaces(const VoxelGrid& grid) {
   VoxelMask faces(static_cast<std::size_t>(grid.Count()), 0);
   for (int k = 0; k < grid.counts[2]; ++k) {
@@ -69,8 +71,10 @@ VoxelMask SideFaces(const VoxelGrid& grid) {
   return faces;
 }
 
-// Air that is reached from beside the volume and from above without passing an opening narrower
-// than `widest_mm`. The first slice may cut airways open, so it lets no outside in.
+// Finds the air that is connected to the sides and the top of the volume by openings wider than
+// `widest_mm`. The air starts from the sides only, because the first slice may cut airways open.
+// Shrinks the air by half the width, which closes narrow openings; floods what remains from the
+// sides; and grows the result back to the tissue.
 VoxelMask FindOutsideAir(const VoxelMask& tissue, const VoxelGrid& grid, double widest_mm,
                          int threads) {
   const double radius = 0.5 * widest_mm;
@@ -93,20 +97,20 @@ VoxelMask FindOutsideAir(const VoxelMask& tissue, const VoxelGrid& grid, double 
   return outside;
 }
 
-// The head's tissue: that of the largest body after what is thin was taken away, with what was thin
-// about that body itself (ears, nose) laid on again. Air inside counts as body, else the bone
-// before a sinus would be thin.
+// Finds the head's tissue: the largest body after thin structures were removed, with the thin parts
+// of that body itself (ears, nose) added again. Air inside counts as body; otherwise the bone in
+// front of a sinus would be thin.
 VoxelMask FindHead(const VoxelMask& tissue, const VoxelMask& outside, const VoxelGrid& grid,
                    double thinnest_mm, int threads) {
-  constexpr double kEar_mm = 20;
+  constexpr double kEar_mm = 20;  // thin parts of the head reach at most this far from its core
   const VoxelMask core = Not(Dilate(outside, grid, 0.5 * thinnest_mm, threads));
   const VoxelMask head_core = LargestComponent(core, grid);
   const VoxelMask near = And(Dilate(head_core, grid, 0.5 * thinnest_mm + kEar_mm, threads), tissue);
   return Flood(near, head_core, grid);
 }
 
-// The longest side of a component's box, mm.
-double LengthOf(const VoxelComponents& components, int component, const VoxelGrid& grid) {
+// The longest side of a component's bounding box.
+double ComponentLength_mm(const VoxelComponents& components, int component, const VoxelGrid& grid) {
   Box3 box;
   const std::int64_t row = grid.counts[0], slice = row * grid.counts[1];
   for (const VoxelRun& run : components.runs) {
@@ -120,10 +124,10 @@ double LengthOf(const VoxelComponents& components, int component, const VoxelGri
   return box.sizes().maxCoeff();
 }
 
-// What is dense and no part of the head, in one line; none if there is nothing.
-std::vector<std::string> NoteLeftOut(const VoxelMask& tissue, const VoxelMask& head,
-                                     const VoxelGrid& grid) {
-  constexpr double kSpeck_cm3 = 1;
+// Describes the dense objects outside of the head in one line; no line if there are none.
+std::vector<std::string> NoteDroppedObjects(const VoxelMask& tissue, const VoxelMask& head,
+                                            const VoxelGrid& grid) {
+  constexpr double kSpeck_cm3 = 1;  // smaller objects are only counted
   const VoxelComponents pieces = LabelComponents(And(Not(head), tissue), grid);
   if (pieces.sizes.empty()) {
     return {};
@@ -135,17 +139,17 @@ std::vector<std::string> NoteLeftOut(const VoxelMask& tissue, const VoxelMask& h
   const auto specks = static_cast<std::ptrdiff_t>(pieces.sizes.size()) - things;
   const int largest = pieces.Largest();
   const std::string large = fmt::format(
-      "{} of {} cm^3 and more (head holder, table, tubes; the largest {:.0f} cm^3, {:.0f} mm long)",
+      "{} of at least {} cm^3 (head holder, table, tubes; the largest {:.0f} cm^3, {:.0f} mm long)",
       things, kSpeck_cm3, static_cast<double>(pieces.sizes[largest]) * voxel_cm3,
-      LengthOf(pieces, largest, grid));
-  return {fmt::format("left out as no part of the head: {}{}{}", things > 0 ? large : "",
+      ComponentLength_mm(pieces, largest, grid));
+  return {fmt::format("left out because not part of the head: {}{}{}", things > 0 ? large : "",
                       things > 0 && specks > 0 ? "; " : "",
                       specks > 0 ? fmt::format("{} smaller (specks, noise)", specks) : "")};
 }
 
 }  // namespace
 
-VoxelGrid GridOf(const CtVolume& volume) {
+VoxelGrid MakeVoxelGrid(const CtVolume& volume) {
   return {{volume.columns, volume.rows, volume.slices}, volume.spacing_mm};
 }
 
@@ -170,25 +174,25 @@ VoxelMask And(VoxelMask a, const VoxelMask& b) {
 
 HeadMask FindHeadMask(const CtVolume& volume, const HeadMaskOptions& options,
                       const RunContext& context) {
-  const VoxelGrid grid = GridOf(volume);
+  const VoxelGrid grid = MakeVoxelGrid(volume);
   const VoxelMask tissue = AtLeast(volume, options.skin_value);
-  const auto outside_of = [&](const VoxelMask& mask) {
+  const auto find_outside = [&](const VoxelMask& mask) {
     context.ThrowIfStopped();
     return FindOutsideAir(mask, grid, options.widest_opening_mm, context.threads);
   };
   HeadMask result;
   result.head =
-      FindHead(tissue, outside_of(tissue), grid, options.thinnest_head_mm, context.threads);
+      FindHead(tissue, find_outside(tissue), grid, options.thinnest_head_mm, context.threads);
   RequireAny(result.head, fmt::format("no tissue above {} HU that is {} mm thick; is the volume in "
                                       "Hounsfield units?",
                                       options.skin_value, options.thinnest_head_mm));
-  result.outside = outside_of(result.head);
+  result.outside = find_outside(result.head);
   RequireAny(result.outside,
              fmt::format("no air below {} HU reaches the sides of the volume; nothing is outside; "
-                         "is the volume in Hounsfield units? (of an MR, import-ct --modality mr "
-                         "takes the skin)",
+                         "is the volume in Hounsfield units? (for an MR, import-ct --modality mr "
+                         "extracts the skin)",
                          options.skin_value));
-  result.notes = NoteLeftOut(tissue, result.head, grid);
+  result.notes = NoteDroppedObjects(tissue, result.head, grid);
   return result;
 }
 

@@ -4,16 +4,35 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 
-#include "problems/ct/half_maximum_edge.h"
 #include "problems/ct/head_mask.h"
-#include "problems/ct/head_size.h"
 #include "problems/ct/volume_surface.h"
 #include "problems/ct/voxel_mask.h"
 #include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_check.h"
 
 namespace semblance {
 namespace {
+
+// Throws InputError if this is shorter than any head: then the unit of the file's lengths is
+// another one, which the message names, and its header must be corrected.
+void CheckLongestSide(double longest_mm, const std::string& name) {
+  if (longest_mm < kSmallestHead_mm) {
+    CheckHeadSize(longest_mm, name, "multiply spacing and origin in the volume's header by {}");
+  }
+}
+
+// A volume may be larger than any head.
+void CheckVolumeSize(const CtVolume& volume) {
+  const Vec3 counts(volume.columns, volume.rows, volume.slices);
+  CheckLongestSide(volume.spacing_mm.cwiseProduct(counts).maxCoeff(), "import-ct: the volume");
+}
+
+void CheckMeshSize(const TriMesh& mesh, const std::string& name) {
+  CheckLongestSide(Bounds(mesh).sizes().maxCoeff(), "import-ct: " + name);
+}
 
 TriMesh KeepLargePieces(const TriMesh& mesh, double smallest_cm2, CtImport& result) {
   const Components pieces = ConnectedComponents(mesh);
@@ -39,11 +58,11 @@ TriMesh KeepLargePieces(const TriMesh& mesh, double smallest_cm2, CtImport& resu
   return Submesh(mesh, keep);
 }
 
-// Streaks of metal (fillings, clips): what passes for bone, is thinner than bone is, and lies in
-// the slices that have metal in them. Nothing where there is no metal.
+// Finds streaks of metal (fillings, clips): voxels with the value of bone that belong to structures
+// thinner than bone, in the slices between the first and the last with metal. Empty without metal.
 VoxelMask FindStreaks(const CtVolume& volume, const CtImportOptions& options,
                       const RunContext& context, std::vector<std::string>& notes) {
-  const VoxelGrid grid = GridOf(volume);
+  const VoxelGrid grid = MakeVoxelGrid(volume);
   const VoxelMask metal = AtLeast(volume, options.metal_hu);
   const VoxelComponents pieces = LabelComponents(metal, grid);
   VoxelMask streaks(metal.size(), 0);
@@ -62,7 +81,7 @@ VoxelMask FindStreaks(const CtVolume& volume, const CtImportOptions& options,
   const double voxel_cm3 = grid.spacing_mm.prod() / 1000;
   notes.push_back(fmt::format(
       "metal: {} pieces above {} HU in slices {} to {} of {}; {:.1f} cm^3 of streaks thinner than "
-      "{} mm taken out of the bone there; look at it",
+      "{} mm removed from the bone there; check it",
       pieces.sizes.size(), options.metal_hu, first / slice + 1, past / slice, grid.counts[2],
       voxel_cm3 * static_cast<double>(std::count(streaks.begin(), streaks.end(), 1)),
       options.thinnest_bone_mm));
@@ -84,11 +103,11 @@ TriMesh SkullSurface(const CtVolume& volume, const VoxelMask& head, const CtImpo
                     "Hounsfield units? Lower bone_hu or smallest_bone_cm2",
                     options.bone_hu, options.smallest_bone_cm2));
   }
-  CheckIsNotTooSmall(skull, "the skull");
+  CheckMeshSize(skull, "the skull");
   return skull;
 }
 
-void MoveToHalfMaximum(const CtVolume& volume, const RunContext& context, CtImport& result) {
+void MoveEdges(const CtVolume& volume, const RunContext& context, CtImport& result) {
   context.Report("import ct", "edges at half maximum");
   result.skull_move_mm = MoveToHalfMaximum(volume, HalfMaximumOptions{}, context, result.skull);
   result.skin_move_mm = MoveToHalfMaximum(volume, HalfMaximumOptions{}, context, result.skin);
@@ -98,10 +117,11 @@ void MoveToHalfMaximum(const CtVolume& volume, const RunContext& context, CtImpo
       result.skull_move_mm, result.skin_move_mm));
 }
 
-// Of a volume as it is.
-CtImport ImportAsItIs(const CtVolume& volume, const CtImportOptions& options,
+// Imports a volume without making it coarser.
+CtImport ImportVolume(const CtVolume& volume, const CtImportOptions& options,
                       const RunContext& context) {
-  constexpr double kTissueHu = 100;  // above skin_hu: what air inside counts as
+  // Air inside counts as this much above the skin's value, so that no surface forms around it.
+  constexpr double kInsideAboveSkin_hu = 100;
   context.Report("import ct", "head and outside air");
   const HeadMask mask = FindHeadMask(volume,
                                      {.skin_value = options.skin_hu,
@@ -113,10 +133,11 @@ CtImport ImportAsItIs(const CtVolume& volume, const CtImportOptions& options,
   context.ThrowIfStopped();
   context.Report("import ct", "surfaces");
   result.skull = SkullSurface(volume, mask.head, options, context, result);
-  result.skin = SkinSurface(volume, mask, options.skin_hu, options.skin_hu + 1 + kTissueHu, context,
-                            result.dropped_skin);
+  result.skin =
+      SkinSurface(volume, mask, options.skin_hu, options.skin_hu + 1 + kInsideAboveSkin_hu, context,
+                  result.dropped_skin);
   if (options.edges == CtEdges::kHalfMaximum) {
-    MoveToHalfMaximum(volume, context, result);
+    MoveEdges(volume, context, result);
   }
   return result;
 }
@@ -124,8 +145,8 @@ CtImport ImportAsItIs(const CtVolume& volume, const CtImportOptions& options,
 CtImport ImportCoarser(const CtVolume& volume, const CtImportOptions& options,
                        const RunContext& context) {
   context.Report("import ct", "coarser voxels");
-  const CtVolume coarser = CoarserVolume(volume, options.coarsen, context.threads);
-  CtImport result = ImportAsItIs(coarser, options, context);
+  const CtVolume coarser = MakeCoarserVolume(volume, options.coarsen, context.threads);
+  CtImport result = ImportVolume(coarser, options, context);
   const Vec3 &from = volume.spacing_mm, &to = coarser.spacing_mm;
   result.notes.insert(
       result.notes.begin(),
@@ -140,13 +161,97 @@ CtImport ImportCoarser(const CtVolume& volume, const CtImportOptions& options,
 CtImport ImportCt(const CtVolume& volume, const CtImportOptions& options,
                   const RunContext& context) {
   CheckVolume(volume, "import-ct");
-  CheckHeadFits(volume);
+  CheckVolumeSize(volume);
   if (!(options.skin_hu < options.bone_hu)) {
     throw InputError(fmt::format("import-ct: skin_hu {} is not below bone_hu {}", options.skin_hu,
                                  options.bone_hu));
   }
   return IsFinerThan(volume, options.coarsen) ? ImportCoarser(volume, options, context)
-                                              : ImportAsItIs(volume, options, context);
+                                              : ImportVolume(volume, options, context);
+}
+
+// ---------------------------------------------------------------------------------------------
+// The skin from an MR volume
+// ---------------------------------------------------------------------------------------------
+
+namespace {
+
+constexpr int kOtsuClasses = 256;
+
+// The number of the last dark class. It maximises the variance between dark and bright classes,
+// which minimises the variance within both.
+int LastDarkClass(const std::array<double, kOtsuClasses>& counts) {
+  double all = 0, all_sum = 0;
+  for (int n = 0; n < kOtsuClasses; ++n) {
+    all += counts[n];
+    all_sum += n * counts[n];
+  }
+  double dark = 0, dark_sum = 0, best = -1;
+  int last = 0;
+  for (int n = 0; n + 1 < kOtsuClasses; ++n) {
+    dark += counts[n];
+    dark_sum += n * counts[n];
+    const double bright = all - dark;
+    if (dark > 0 && bright > 0) {
+      const double distance = dark_sum / dark - (all_sum - dark_sum) / bright;
+      const double between = dark * bright * distance * distance;
+      if (between > best) {
+        best = between;
+        last = n;
+      }
+    }
+  }
+  return last;
+}
+
+// The value that one voxel in a thousand exceeds.
+double NearlyBrightest(const CtVolume& volume) {
+  std::array<std::int64_t, 65536> counts = {};
+  for (const std::int16_t value : volume.values) {
+    ++counts[value + 32768];
+  }
+  const auto allowed = static_cast<std::int64_t>(volume.values.size() / 1000);
+  int value = 65535;
+  for (std::int64_t above = counts[value]; above <= allowed && value > 0; above += counts[value]) {
+    --value;
+  }
+  return value - 32768;
+}
+
+}  // namespace
+
+double OtsuThreshold(const CtVolume& volume) {
+  const double low = *std::ranges::min_element(volume.values);
+  const double width = std::max(1.0, NearlyBrightest(volume) - low) / kOtsuClasses;
+  std::array<double, kOtsuClasses> counts = {};
+  for (const std::int16_t value : volume.values) {
+    ++counts[std::min(kOtsuClasses - 1, static_cast<int>((value - low) / width))];
+  }
+  return low + width * (LastDarkClass(counts) + 1);
+}
+
+MrSkin ImportMrSkin(const CtVolume& volume, const MrSkinOptions& options,
+                    const RunContext& context) {
+  CheckVolume(volume, "import-ct");
+  CheckVolumeSize(volume);
+  MrSkin result;
+  result.skin_value = options.skin_value > 0 ? options.skin_value : OtsuThreshold(volume);
+  context.Report("import mr", "head and outside air");
+  const HeadMask mask = FindHeadMask(volume,
+                                     {.skin_value = result.skin_value,
+                                      .thinnest_head_mm = options.thinnest_head_mm,
+                                      .widest_opening_mm = options.widest_opening_mm},
+                                     context);
+  context.Report("import mr", "skin");
+  result.notes = mask.notes;
+  result.skin = SkinSurface(volume, mask, result.skin_value, 2 * std::abs(result.skin_value) + 1,
+                            context, result.dropped);
+  CheckMeshSize(result.skin, "the skin");
+  result.notes.push_back(fmt::format("skin at the grey value {:.0f}{}", result.skin_value,
+                                     options.skin_value > 0 ? "" : ", found by Otsu's method"));
+  result.notes.push_back(
+      "no skull: bone is as dark as air in MR; take the skull from a CT of the same head");
+  return result;
 }
 
 }  // namespace semblance

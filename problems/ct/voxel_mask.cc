@@ -14,7 +14,7 @@ namespace {
 
 const float kFar = std::numeric_limits<float>::infinity();
 
-// Appends the runs of the line of voxels that begins at `start`.
+// Appends the runs of the line of `count` voxels that begins at `start`.
 void AppendRuns(const VoxelMask& mask, std::int64_t start, int count, std::vector<VoxelRun>& runs) {
   const std::uint8_t* const begin = mask.data() + start;
   const std::uint8_t* const end = begin + count;
@@ -30,7 +30,7 @@ void AppendRuns(const VoxelMask& mask, std::int64_t start, int count, std::vecto
   }
 }
 
-// Sets of runs that are connected; the representative of a set is its first run.
+// Disjoint sets of connected runs (union-find); the representative of a set is its first run.
 class RunSets {
  public:
   explicit RunSets(std::size_t count) : parent_(count) {
@@ -52,7 +52,8 @@ class RunSets {
   std::vector<std::int32_t> parent_;
 };
 
-// Joins the runs of two lines that lie side by side; `apart` is the difference of their indices.
+// Joins touching runs of two neighbouring lines. `apart` is the difference of the lines' voxel
+// indices.
 void JoinLines(const std::vector<VoxelRun>& runs, const std::vector<std::int32_t>& line_start,
                std::int64_t line, std::int64_t other, std::int64_t apart, RunSets& sets) {
   std::int32_t a = line_start[line], b = line_start[other];
@@ -66,7 +67,7 @@ void JoinLines(const std::vector<VoxelRun>& runs, const std::vector<std::int32_t
   }
 }
 
-// Numbers the sets in order of their first run, and counts their voxels.
+// Numbers the sets in the order of their first run, and counts their voxels.
 void NumberComponents(RunSets& sets, VoxelComponents& components) {
   for (std::size_t r = 0; r < components.runs.size(); ++r) {
     VoxelRun& run = components.runs[r];
@@ -81,13 +82,14 @@ void NumberComponents(RunSets& sets, VoxelComponents& components) {
   }
 }
 
-// Lines of floats side by side, at first + r * stride for r in [0, rows).
+// Parallel lines of floats; line r begins at first + r * stride, for r in [0, rows).
 struct LineStack {
   std::int64_t first = 0, stride = 0;
   int rows = 0, columns = 0;
 };
 
-// Lowers each squared distance to that over another line of the stack; cost[n]: that of n lines.
+// Lowers each squared distance to the least one over all lines of the stack within reach. cost[n]
+// is the squared distance of n lines.
 void LowerOverLines(const LineStack& stack, const std::vector<float>& cost,
                     std::vector<float>& squared) {
   const int reach = static_cast<int>(cost.size()) - 1;
@@ -115,7 +117,7 @@ void LowerOverLines(const LineStack& stack, const std::vector<float>& cost,
   }
 }
 
-// The squared way of n steps for each n within reach.
+// The squared distance of n steps for each n within reach.
 std::vector<float> StepCosts(double spacing_mm, double reach_mm, int count) {
   const int steps = std::min(count - 1, static_cast<int>(reach_mm / spacing_mm));
   std::vector<float> cost;
@@ -125,7 +127,7 @@ std::vector<float> StepCosts(double spacing_mm, double reach_mm, int count) {
   return cost;
 }
 
-// Squared distances along one line of voxels, from its runs.
+// The squared distances to the mask along one line of voxels: one sweep forward, one backward.
 void DistancesInLine(const std::uint8_t* mask, int count, const std::vector<float>& cost,
                      float* squared) {
   const int reach = static_cast<int>(cost.size()) - 1;
@@ -174,8 +176,8 @@ VoxelComponents LabelComponents(const VoxelMask& mask, const VoxelGrid& grid) {
   return components;
 }
 
-VoxelMask MaskOf(const VoxelComponents& components, const std::vector<bool>& keep,
-                 const VoxelGrid& grid) {
+VoxelMask MakeMask(const VoxelComponents& components, const std::vector<bool>& keep,
+                   const VoxelGrid& grid) {
   VoxelMask mask(static_cast<std::size_t>(grid.Count()), 0);
   for (const VoxelRun& run : components.runs) {
     if (keep[run.component]) {
@@ -187,16 +189,18 @@ VoxelMask MaskOf(const VoxelComponents& components, const std::vector<bool>& kee
 
 VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGrid& grid) {
   const VoxelComponents components = LabelComponents(allowed, grid);
-  std::vector<bool> wet(components.sizes.size(), false);
+  std::vector<bool> reached(components.sizes.size(), false);
   for (const VoxelRun& run : components.runs) {
-    if (!wet[run.component]) {
-      wet[run.component] = std::memchr(starts.data() + run.first, 1,
-                                       static_cast<std::size_t>(run.length)) != nullptr;
+    if (!reached[run.component]) {
+      reached[run.component] = std::memchr(starts.data() + run.first, 1,
+                                           static_cast<std::size_t>(run.length)) != nullptr;
     }
   }
-  return MaskOf(components, wet, grid);
+  return MakeMask(components, reached, grid);
 }
 
+// An exact distance transform, one axis after the other, because a squared distance is a sum over
+// the axes. The reach is short, so each axis simply tries all lines within reach.
 VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads) {
   const auto [columns, rows, slices] = grid.counts;
   const std::int64_t row = columns, slice = row * rows;
@@ -217,7 +221,8 @@ VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_m
     LowerOverLines({static_cast<std::int64_t>(j) * row, slice, slices, columns}, over_slices,
                    squared);
   });
-  const auto limit = static_cast<float>(distance_mm * distance_mm * (1 + 1e-6));
+  constexpr double kRoundOff = 1e-6;  // of squared distances as floats
+  const auto limit = static_cast<float>(distance_mm * distance_mm * (1 + kRoundOff));
   VoxelMask grown(mask.size());
   std::transform(squared.begin(), squared.end(), grown.begin(),
                  [&](float d) { return static_cast<std::uint8_t>(d <= limit); });

@@ -10,7 +10,7 @@
 
 namespace semblance {
 
-// The counts and spacing of a regular grid; its first axis runs fastest.
+// The size and spacing of a regular grid; its first axis runs fastest.
 struct VoxelGrid {
   std::array<int, 3> counts = {0, 0, 0};
   Vec3 spacing_mm = Vec3::Constant(kNaN);
@@ -21,7 +21,7 @@ struct VoxelGrid {
   std::int64_t Count() const { return std::int64_t{counts[0]} * counts[1] * counts[2]; }
 };
 
-// One entry per voxel, 1 in the set, 0 not.
+// One entry per voxel: 1 in the set, 0 outside.
 using VoxelMask = std::vector<std::uint8_t>;
 
 // Voxels of a mask that follow each other along the first axis.
@@ -31,25 +31,26 @@ struct VoxelRun {
   std::int32_t component = -1;
 };
 
-// The components of a mask by shared faces, numbered 0, 1, ... in order of the first voxel.
+// The connected components of a mask, numbered 0, 1, ... in order of their first voxel. Voxels are
+// connected if they share a face.
 struct VoxelComponents {
-  std::vector<VoxelRun> runs;       // in order; together all voxels of the mask
-  std::vector<std::int64_t> sizes;  // voxels, one per component
+  std::vector<VoxelRun> runs;       // all voxels of the mask, in order
+  std::vector<std::int64_t> sizes;  // number of voxels per component
 
-  int Largest() const;  // the first of the largest; -1 if there is none
+  // Number of the largest component, the first one if several are equal; -1 if there is none.
+  int Largest() const;
 };
 VoxelComponents LabelComponents(const VoxelMask& mask, const VoxelGrid& grid);
 
 // The voxels of the components for which keep[component] is true.
-VoxelMask MaskOf(const VoxelComponents& components, const std::vector<bool>& keep,
-                 const VoxelGrid& grid);
+VoxelMask MakeMask(const VoxelComponents& components, const std::vector<bool>& keep,
+                   const VoxelGrid& grid);
 
-// The voxels of `allowed` that can be reached by shared faces from those of `starts` that are in
-// it.
+// The components of `allowed` that contain a voxel of `starts`.
 VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGrid& grid);
 
-// The voxels whose centre is within distance_mm (>= 0) of the centre of one in the mask. Exact for
-// axes that are square.
+// The voxels whose centre is within distance_mm (>= 0) of the centre of a voxel in the mask. Exact
+// for axes at right angles.
 VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads);
 
 }  // namespace semblance

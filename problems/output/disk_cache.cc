@@ -18,13 +18,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// A file of the cache is KEY.bin and begins with this line; others in its folder are not touched.
+// A file of the cache is KEY.bin and begins with this line. Other files in the folder are never
+// deleted.
 constexpr std::string_view kCacheMark = "semblance cache 1\n";
 constexpr std::size_t kHashDigits = 64;
 constexpr std::string_view kEnding = ".bin";
 
-// By its name alone.
-bool MayBeOurs(const fs::path& path) {
+bool HasCacheName(const fs::path& path) {
   const std::string stem = path.stem().string();
   return path.extension() == kEnding && stem.size() == kHashDigits &&
          stem.find_first_not_of("0123456789abcdef") == stem.npos;
@@ -44,20 +44,20 @@ DiskCache::DiskCache(fs::path folder, std::uintmax_t limit_bytes)
   std::error_code error;
   fs::create_directories(folder_, error);
   if (error || !fs::is_directory(folder_, error)) {
-    throw IoError(fmt::format("{}: no folder for the cache, and none can be made there{}{}",
+    throw IoError(fmt::format("{}: no folder for the cache, and it cannot be created{}{}",
                               folder_.string(), error ? ": " : "",
                               error ? error.message() : std::string()));
   }
 }
 
-fs::path DiskCache::FileOf(const std::string& key) const {
+fs::path DiskCache::FilePath(const std::string& key) const {
   return folder_ / (key + std::string(kEnding));
 }
 
 std::optional<std::string> DiskCache::Get(const std::string& key) const {
   std::string file;
   try {
-    file = ReadFileBytes(FileOf(key));
+    file = ReadFileBytes(FilePath(key));
   } catch (const IoError&) {
     return std::nullopt;
   }
@@ -67,17 +67,17 @@ std::optional<std::string> DiskCache::Get(const std::string& key) const {
     return std::nullopt;
   }
   std::error_code ignored;
-  fs::last_write_time(FileOf(key), fs::file_time_type::clock::now(), ignored);
+  fs::last_write_time(FilePath(key), fs::file_time_type::clock::now(), ignored);
   return bytes;
 }
 
 void DiskCache::Put(const std::string& key, std::string_view bytes) const {
   try {
     SweepTemporaryFiles(folder_);
-    WriteFileAtomically(FileOf(key),
+    WriteFileAtomically(FilePath(key),
                         std::string(kCacheMark).append(Sha256OfText(bytes)).append(bytes));
   } catch (const IoError&) {
-    return;  // a full disk costs time, not the result
+    return;  // on a full disk the value is computed again
   }
   Trim();
 }
@@ -90,12 +90,12 @@ void DiskCache::Trim() const {
   };
   std::vector<Kept> files;
   std::uintmax_t total = 0;
-  std::error_code error;  // another process may be trimming too: files may vanish at any time
+  std::error_code error;  // files may vanish at any time, because other processes trim too
   for (fs::directory_iterator at(folder_, error), end; !error && at != end; at.increment(error)) {
     std::error_code gone;
     const std::uintmax_t size = at->file_size(gone);
     const fs::file_time_type used = gone ? fs::file_time_type() : at->last_write_time(gone);
-    if (!gone && MayBeOurs(at->path()) && BeginsWithMark(at->path())) {
+    if (!gone && HasCacheName(at->path()) && BeginsWithMark(at->path())) {
       files.push_back({used, at->path(), size});
       total += size;
     }

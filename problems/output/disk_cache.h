@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Work that several processes share is done once: bytes in a folder, by the hash of what they were
-// made from.
+// A cache on disk that several processes share: results are bytes in a folder, and the key is the
+// hash of what they were computed from.
 #pragma once
 
 #include <cstdint>
@@ -11,21 +11,22 @@
 
 namespace semblance {
 
-// Safe from several threads and processes: a file is written whole or not at all, carries a hash of
-// its content, and is read as missing where it does not fit. Once there is a folder, nothing here
-// is an error that stops work: what cannot be kept is made again.
+// Several threads and processes may use one folder at the same time: a file is written whole or not
+// at all, contains a hash of its content, and counts as missing if the hash does not match. Faults
+// of the disk are not errors: a value that cannot be stored is computed again.
 class DiskCache {
  public:
-  // Above limit_bytes the files that were read or written longest ago go. Throws IoError if there
-  // is no such folder and it cannot be made; one that can only be read is one to read from.
+  // If the files exceed limit_bytes, those that were read or written longest ago are deleted.
+  // Throws IoError if there is no such folder and it cannot be made. A folder without permission to
+  // write serves for reading.
   DiskCache(std::filesystem::path folder, std::uintmax_t limit_bytes);
 
-  // key: lower-case hexadecimal, 64 digits (Sha256OfText).
+  // key: 64 lower-case hexadecimal digits (Sha256OfText).
   std::optional<std::string> Get(const std::string& key) const;
   void Put(const std::string& key, std::string_view bytes) const;
 
  private:
-  std::filesystem::path FileOf(const std::string& key) const;
+  std::filesystem::path FilePath(const std::string& key) const;
   void Trim() const;
 
   std::filesystem::path folder_;

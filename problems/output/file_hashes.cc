@@ -9,7 +9,7 @@ namespace semblance {
 namespace fs = std::filesystem;
 
 std::string FileHashes::Of(const fs::path& file) {
-  std::error_code ignored;  // what cannot be read is told by Sha256OfFile
+  std::error_code ignored;  // Sha256OfFile reports a file that cannot be read
   const std::uintmax_t size = fs::file_size(file, ignored);
   const fs::file_time_type changed = fs::last_write_time(file, ignored);
   {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The hashes of files that many trials of a study have in common.
+// Hashes of files that many trials of a study share, so that each file is read once.
 #pragma once
 
 #include <cstdint>
@@ -10,11 +10,10 @@
 
 namespace semblance {
 
-// Several threads may ask at a time.
+// Several threads may use one object at the same time.
 class FileHashes {
  public:
-  // Sha256OfFile. A file is read again only once its size or the time of its last change is
-  // another.
+  // Sha256OfFile. Reads a file again only if its size or the time of its last change differs.
   std::string Of(const std::filesystem::path& file);
 
  private:

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

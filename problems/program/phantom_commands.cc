@@ -13,7 +13,7 @@
 
 #include "problems/command_line/exit_code.h"
 #include "problems/landmark_files/read_landmarks.h"
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/output/staged_folder.h"
 #include "problems/phantom/phantom_ct.h"
 #include "problems/program/work_options.h"

@@ -14,8 +14,8 @@
 #include "problems/command_line/exit_code.h"
 #include "problems/command_line/shard.h"
 #include "problems/config/terminal_text.h"
-#include "problems/output/files.h"
 #include "problems/output/given_files.h"
+#include "problems/output/output_folder.h"
 #include "problems/population/population_result.h"
 #include "problems/population/population_run.h"
 

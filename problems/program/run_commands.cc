@@ -19,9 +19,9 @@
 #include <vector>
 
 #include "problems/command_line/exit_code.h"
-#include "problems/ct/mr_skin.h"
+#include "problems/ct/import_ct.h"
 #include "problems/inputs/input_files.h"
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/case.h"
 #include "problems/pipeline/experiment_config.h"

@@ -17,7 +17,7 @@
 #include <vector>
 
 #include "problems/command_line/exit_code.h"
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/program/stop_signals.h"
 #include "problems/serving/http_server.h"
 #include "surfaces/base/error.h"

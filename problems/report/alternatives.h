@@ -8,7 +8,7 @@
 
 #include "problems/config/config_tree.h"
 #include "problems/inputs/input_files.h"
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/pipeline/stage_cache.h"
 #include "problems/run.h"
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <string_view>
 
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/pipeline/experiment.h"
 #include "problems/run.h"
 

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/pictures/colour_map.h"
 #include "problems/pictures/render.h"
 #include "problems/preparation/mirror.h"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "interp/evaluation/cross_validation.h"
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/pictures/colour_map.h"
 #include "problems/pipeline/depth_comparison.h"
 

@@ -2,7 +2,7 @@
 // The report of a study, as one page.
 #pragma once
 
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/study/study_tables.h"
 
 namespace semblance {

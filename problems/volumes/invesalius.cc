@@ -19,18 +19,19 @@
 namespace semblance {
 namespace {
 
-constexpr int kMostVoxelsASide = 4096;
-constexpr std::size_t kMostPlistBytes = 1 << 20;
+// Limits of a damaged or hostile file; real projects are far below them.
+constexpr int kMaxVoxelsPerSide = 4096;
+constexpr std::size_t kMaxPlist_bytes = 1 << 20;
 
 struct ArchiveCloser {
   void operator()(archive* a) const { archive_read_free(a); }
 };
 using Archive = std::unique_ptr<archive, ArchiveCloser>;
 
-[[noreturn]] void ThrowNoProject(const std::string& name, archive* a) {
-  throw IoError(
-      fmt::format("{}: it is no InVesalius project (a tar, gzipped or not), or is cut short: {}",
-                  name, archive_error_string(a) ? archive_error_string(a) : "unknown format"));
+[[noreturn]] void ThrowNotAProject(const std::string& name, archive* a) {
+  throw IoError(fmt::format(
+      "{}: it is not an InVesalius project (a tar, gzipped or not), or is cut short: {}", name,
+      archive_error_string(a) ? archive_error_string(a) : "unknown format"));
 }
 
 Archive OpenArchive(const std::string& name) {
@@ -44,33 +45,33 @@ Archive OpenArchive(const std::string& name) {
   archive_read_support_format_tar(a.get());
   constexpr std::size_t kArchiveBlock = 1 << 16;
   if (archive_read_open_filename(a.get(), name.c_str(), kArchiveBlock) != ARCHIVE_OK) {
-    ThrowNoProject(name, a.get());
+    ThrowNotAProject(name, a.get());
   }
   return a;
 }
 
-// most: bytes that are wanted; of more, one more is read, and the rest is not looked at.
-std::string ReadData(archive* a, const std::string& name, std::size_t most) {
+// Reads at most max_bytes + 1 bytes: the additional byte shows that there are more.
+std::string ReadData(archive* a, const std::string& name, std::size_t max_bytes) {
   std::string bytes;
   std::array<char, 1 << 16> block;
   for (;;) {
     const la_ssize_t got = archive_read_data(a, block.data(), block.size());
     if (got < 0) {
-      ThrowNoProject(name, a);
+      ThrowNotAProject(name, a);
     }
     if (got == 0) {
       return bytes;
     }
     bytes.append(block.data(), static_cast<std::size_t>(got));
-    if (bytes.size() > most) {
-      bytes.resize(most + 1);
+    if (bytes.size() > max_bytes) {
+      bytes.resize(max_bytes + 1);
       return bytes;
     }
   }
 }
 
-// The bytes of the first entry with this file name, whatever its folder, as ReadData gives them.
-std::string ReadEntry(const std::string& name, const std::string& wanted, std::size_t most) {
+// Reads the first entry with this file name in any folder, like ReadData.
+std::string ReadEntry(const std::string& name, const std::string& wanted, std::size_t max_bytes) {
   const Archive a = OpenArchive(name);
   archive_entry* entry = nullptr;
   for (;;) {
@@ -79,17 +80,17 @@ std::string ReadEntry(const std::string& name, const std::string& wanted, std::s
       throw IoError(fmt::format("{}: the project has no entry '{}'", name, wanted));
     }
     if (status != ARCHIVE_OK && status != ARCHIVE_WARN) {
-      ThrowNoProject(name, a.get());
+      ThrowNotAProject(name, a.get());
     }
     const char* path = archive_entry_pathname(entry);
     if (path && std::filesystem::path(path).filename() == wanted) {
-      return ReadData(a.get(), name, most);
+      return ReadData(a.get(), name, max_bytes);
     }
   }
 }
 
 // The node that follows <key>key</key> in a dict of a property list.
-pugi::xml_node ValueOf(const pugi::xml_node& dict, const char* key, const std::string& name) {
+pugi::xml_node PlistValue(const pugi::xml_node& dict, const char* key, const std::string& name) {
   for (const pugi::xml_node node : dict.children("key")) {
     if (std::strcmp(node.child_value(), key) == 0 && node.next_sibling()) {
       return node.next_sibling();
@@ -114,38 +115,38 @@ std::array<double, 3> ThreeNumbers(const pugi::xml_node& array, const char* key,
   return numbers;
 }
 
-struct Header {
+struct ProjectHeader {
   std::string matrix_file;
-  CtVolume volume;  // no values yet
+  CtVolume volume;  // without values
 };
 
-Header ParseHeader(const std::string& plist, const std::string& name) {
+ProjectHeader ParseProjectHeader(const std::string& plist, const std::string& name) {
   pugi::xml_document document;
   if (!document.load_buffer(plist.data(), plist.size())) {
     throw IoError(fmt::format("{}: main.plist is not a property list", name));
   }
   const pugi::xml_node dict = document.child("plist").child("dict");
-  const pugi::xml_node matrix = ValueOf(dict, "matrix", name);
-  const std::string type = ValueOf(matrix, "dtype", name).text().as_string();
+  const pugi::xml_node matrix = PlistValue(dict, "matrix", name);
+  const std::string type = PlistValue(matrix, "dtype", name).text().as_string();
   if (type != "int16") {
     throw InputError(fmt::format("{}: the matrix is of type '{}'; only int16 is read", name, type));
   }
-  // 1 is axial; the frame of ReadInvesalius holds for no other.
-  const int orientation = ValueOf(dict, "orientation", name).text().as_int(-1);
+  // 1 is axial. The frame of ReadInvesalius is valid for this orientation only.
+  const int orientation = PlistValue(dict, "orientation", name).text().as_int(-1);
   if (orientation != 1) {
     throw InputError(fmt::format("{}: slices of orientation {} are not read; only 1 (axial) is",
                                  name, orientation));
   }
-  const auto shape = ThreeNumbers(ValueOf(matrix, "shape", name), "shape", name);
+  const auto shape = ThreeNumbers(PlistValue(matrix, "shape", name), "shape", name);
   for (const double n : shape) {
-    if (!(n >= 2 && n <= kMostVoxelsASide) || n != std::floor(n)) {
+    if (!(n >= 2 && n <= kMaxVoxelsPerSide) || n != std::floor(n)) {
       throw InputError(fmt::format("{}: a shape of {} voxels is not usable; each side is 2 to {}",
-                                   name, fmt::join(shape, " x "), kMostVoxelsASide));
+                                   name, fmt::join(shape, " x "), kMaxVoxelsPerSide));
     }
   }
-  const auto spacing = ThreeNumbers(ValueOf(dict, "spacing", name), "spacing", name);
-  Header header;
-  header.matrix_file = ValueOf(matrix, "filename", name).text().as_string();
+  const auto spacing = ThreeNumbers(PlistValue(dict, "spacing", name), "spacing", name);
+  ProjectHeader header;
+  header.matrix_file = PlistValue(matrix, "filename", name).text().as_string();
   header.volume.slices = static_cast<int>(shape[0]);
   header.volume.rows = static_cast<int>(shape[1]);
   header.volume.columns = static_cast<int>(shape[2]);
@@ -157,11 +158,11 @@ Header ParseHeader(const std::string& plist, const std::string& name) {
 
 CtVolume ReadInvesalius(const std::filesystem::path& path) {
   const std::string name = path.string();
-  const std::string plist = ReadEntry(name, "main.plist", kMostPlistBytes);
-  if (plist.size() > kMostPlistBytes) {
-    throw InputError(fmt::format("{}: main.plist is larger than {} bytes", name, kMostPlistBytes));
+  const std::string plist = ReadEntry(name, "main.plist", kMaxPlist_bytes);
+  if (plist.size() > kMaxPlist_bytes) {
+    throw InputError(fmt::format("{}: main.plist is larger than {} bytes", name, kMaxPlist_bytes));
   }
-  Header header = ParseHeader(plist, name);
+  ProjectHeader header = ParseProjectHeader(plist, name);
   CtVolume volume = std::move(header.volume);
   const std::size_t voxels = volume.Index(0, 0, volume.slices);
   CheckVolumeClaim(
@@ -178,7 +179,7 @@ CtVolume ReadInvesalius(const std::filesystem::path& path) {
                                                     : fmt::format("{}", bytes.size()),
                               volume.slices, volume.rows, volume.columns, needed));
   }
-  static_assert(std::endian::native == std::endian::little);  // as the file is
+  static_assert(std::endian::native == std::endian::little);  // like the file
   volume.values.resize(voxels);
   const std::size_t row_bytes = volume.columns * sizeof(std::int16_t);
   for (int slice = 0; slice < volume.slices; ++slice) {

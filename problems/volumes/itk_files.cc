@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/volumes/itk_files.h"
 
-// First, else ITK's headers bring a part of an older Eigen of their own.
+// Must come first: ITK's headers otherwise include parts of an older Eigen of their own.
 #include <Eigen/Dense>
 
 #include <fmt/format.h>
@@ -21,14 +21,13 @@
 #include <limits>
 #include <sstream>
 
-#include "problems/volumes/header_place.h"
-#include "problems/volumes/nifti_file.h"
+#include "problems/volumes/volume_headers.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {
 namespace {
 
-// Both libraries tell their troubles on the terminal too.
+// Both libraries also print their errors to the terminal.
 void SilenceLibraries() {
   itk::Object::SetGlobalWarningDisplay(false);
   gdcm::Trace::DebugOff();
@@ -36,8 +35,8 @@ void SilenceLibraries() {
   gdcm::Trace::ErrorOff();
 }
 
-// Of ITK's words the last sentence, without the address of an object in memory.
-std::string WordsOf(const itk::ExceptionObject& error) {
+// The last sentence of ITK's message, without the address of an object in memory.
+std::string ErrorText(const itk::ExceptionObject& error) {
   std::string words = error.GetDescription();
   const std::size_t address = words.find("): ");
   words = address == words.npos ? words : words.substr(address + 3);
@@ -94,7 +93,7 @@ void AppendRounded(const itk::ImageIOBase& io, const void* buffer, std::size_t c
   }
 }
 
-// The file's voxels, all of them; throws unless there are as many as expected.
+// Appends all voxels of the file. Throws unless their number is as expected.
 void AppendVoxels(itk::ImageIOBase& io, std::size_t expected, VoxelArray& array,
                   const std::string& where) {
   if (io.GetNumberOfComponents() != 1) {
@@ -111,7 +110,9 @@ void AppendVoxels(itk::ImageIOBase& io, std::size_t expected, VoxelArray& array,
   if (count != expected) {
     throw InputError(fmt::format("{}: {} voxels instead of {}", where, count, expected));
   }
-  constexpr char kUntouched = 0x5a;  // no scanner's value, were all voxels of a part to have it
+  // Not every library reports a short file; some leave the end of the buffer as it is. No scanner
+  // writes 1024 equal bytes of this value.
+  constexpr char kUntouched = 0x5a;
   constexpr std::size_t kTail = 1024;
   std::vector<char> buffer(static_cast<std::size_t>(io.GetImageSizeInBytes()), kUntouched);
   io.Read(buffer.data());
@@ -127,7 +128,7 @@ struct Reader {
   const char* name;
 };
 
-Reader ReaderOf(VolumeFormat format) {
+Reader MakeReader(VolumeFormat format) {
   switch (format) {
     case VolumeFormat::kNifti:
       return {itk::NiftiImageIO::New().GetPointer(), "NIfTI"};
@@ -138,22 +139,21 @@ Reader ReaderOf(VolumeFormat format) {
   }
 }
 
-// Before memory is taken for the voxels. Those of a detached header lie in another file.
+// Called before memory is allocated for the voxels.
 void CheckClaim(const itk::ImageIOBase& io, const std::filesystem::path& file) {
-  const std::string ending = file.extension().string();
-  const bool detached = ending == ".nhdr" || ending == ".mhd" || ending == ".hdr";
-  VolumeClaim claim{
-      .counts = {1, 1, 1},
-      .bytes_per_voxel = static_cast<double>(io.GetComponentSize()),
-      .file_bytes = detached ? kNaN : static_cast<double>(std::filesystem::file_size(file))};
+  VolumeClaim claim{.counts = {1, 1, 1},
+                    .bytes_per_voxel = static_cast<double>(io.GetComponentSize()),
+                    .file_bytes = HasDetachedVoxels(file)
+                                      ? kNaN
+                                      : static_cast<double>(std::filesystem::file_size(file))};
   for (unsigned axis = 0; axis < std::min(3U, io.GetNumberOfDimensions()); ++axis) {
     claim.counts[axis] = static_cast<double>(io.GetDimensions(axis));
   }
   CheckVolumeClaim(claim, file.string());
 }
 
-// Counts, origin and steps, in LPS and mm as ITK gives them for every format.
-VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::filesystem::path& file) {
+// Reads counts, origin and steps. ITK provides them in LPS and mm for every format.
+VoxelArray ReadGeometry(const itk::ImageIOBase& io, const std::filesystem::path& file) {
   const std::string where = file.string();
   const unsigned axes = io.GetNumberOfDimensions();
   for (unsigned axis = 3; axis < axes; ++axis) {
@@ -180,32 +180,32 @@ VoxelArray GeometryOf(const itk::ImageIOBase& io, const std::filesystem::path& f
   return array;
 }
 
-std::string HeadOf(const std::filesystem::path& file, std::uintmax_t most = 4096) {
+std::string ReadHead(const std::filesystem::path& file, std::uintmax_t max_bytes = 4096) {
   std::ifstream in(file, std::ios::binary);
-  std::string head(std::min(std::filesystem::file_size(file), most), ' ');
+  std::string head(std::min(std::filesystem::file_size(file), max_bytes), ' ');
   in.read(head.data(), static_cast<std::streamsize>(head.size()));
   return head;
 }
 
-// MetaImage's library goes through as many axes as its header claims, however many these are.
+// MetaImage's library loops over as many axes as the header claims, without a limit.
 void CheckMetaImageAxes(const std::filesystem::path& file) {
-  const std::string head = HeadOf(file);
+  const std::string head = ReadHead(file);
   const std::size_t line = head.find("NDims"), sign = head.find('=', line);
   if (line == head.npos || sign == head.npos) {
-    return;  // the library says what is missing
+    return;  // the library reports what is missing
   }
   const int axes = std::atoi(head.substr(sign + 1, 16).c_str());
-  constexpr int kMostAxes = 10;  // of the library
-  if (axes < 1 || axes > kMostAxes) {
+  constexpr int kMaxAxes = 10;  // the limit of the library
+  if (axes < 1 || axes > kMaxAxes) {
     throw InputError(
         fmt::format("{}: NDims is not a number of axes; a volume has 3", file.string()));
   }
 }
 
-// Neither NIfTI's nor MetaImage's library says that a file ends too early; NRRD's does. What is in
-// a MetaImage can be seen from its size where it is one file and not compressed.
+// The libraries of NIfTI and MetaImage do not report a file that ends too early; that of NRRD does.
+// The size of a MetaImage shows it if the MetaImage is one file and not compressed.
 void CheckMetaImageWhole(const std::filesystem::path& file, std::uintmax_t needed) {
-  const std::string head = HeadOf(file);
+  const std::string head = ReadHead(file);
   const std::size_t local = head.find("LOCAL");
   if (local == head.npos || head.find("CompressedData = True") != head.npos) {
     return;
@@ -217,17 +217,17 @@ void CheckMetaImageWhole(const std::filesystem::path& file, std::uintmax_t neede
   }
 }
 
-// What ends the libraries, or keeps them busy for ever. ITK takes a NIfTI's matrix apart without
-// end if it holds what is not a number, or a huge one.
+// Refuses files that end the libraries or keep them busy forever. ITK's decomposition of a NIfTI
+// matrix does not end if the matrix holds a huge number or one that is not finite.
 void CheckForLibrary(const std::filesystem::path& file, VolumeFormat format) {
   if (format == VolumeFormat::kMetaImage) {
     CheckMetaImageAxes(file);
   } else if (format == VolumeFormat::kNifti) {
-    CheckNiftiPlaces(file);
+    CheckNiftiPlace(file);
   }
 }
 
-// A NIfTI's size is not that which ITK says: it makes floats of voxels with a slope.
+// ITK's size of a NIfTI does not serve here: ITK converts voxels with a slope to floats.
 void CheckWhole(const std::filesystem::path& file, VolumeFormat format,
                 const itk::ImageIOBase& io) {
   if (format == VolumeFormat::kMetaImage) {
@@ -237,24 +237,25 @@ void CheckWhole(const std::filesystem::path& file, VolumeFormat format,
   }
 }
 
-HeaderPlace PlaceOfNifti(const std::filesystem::path& file) {
+HeaderPlace ReadNiftiPlace(const std::filesystem::path& file) {
   HeaderPlace place;
-  if (!NiftiSaysHowItLies(file)) {
+  if (!NiftiHasPlace(file)) {
     place.notes.emplace_back(
-        "the file does not say how it lies (its qform_code and sform_code are 0); taken as LPS");
+        "the file does not state its orientation (its qform_code and sform_code are 0); taken as "
+        "LPS");
   }
   return place;
 }
 
-HeaderPlace PlaceOf(const std::filesystem::path& file, VolumeFormat format) {
-  constexpr std::uintmax_t kLongestText = 1 << 20;
+HeaderPlace ReadPlace(const std::filesystem::path& file, VolumeFormat format) {
+  constexpr std::uintmax_t kMaxHeader_bytes = 1 << 20;
   switch (format) {
     case VolumeFormat::kNifti:
-      return PlaceOfNifti(file);
+      return ReadNiftiPlace(file);
     case VolumeFormat::kNrrd:
-      return PlaceOfNrrd(HeadOf(file, kLongestText), file.string());
+      return ParseNrrdPlace(ReadHead(file, kMaxHeader_bytes), file.string());
     default:
-      return PlaceOfMetaImage(HeadOf(file, kLongestText));
+      return ParseMetaImagePlace(ReadHead(file, kMaxHeader_bytes));
   }
 }
 
@@ -282,7 +283,7 @@ std::string Text(const gdcm::Scanner& scanner, const std::string& file, const gd
   return text;
 }
 
-// The numbers of a tag, which backslashes part; empty unless there are as many as expected.
+// The numbers of a tag, separated by backslashes; empty unless their number is as expected.
 std::vector<double> Numbers(const std::string& text, std::size_t expected) {
   std::vector<double> numbers;
   std::istringstream parts(text);
@@ -298,12 +299,12 @@ std::vector<double> Numbers(const std::string& text, std::size_t expected) {
 
 int Count(const std::string& text, int otherwise) {
   const std::vector<double> number = Numbers(text, 1);
-  constexpr double kMost = 1e9;  // also for what no int can hold
-  return number.empty() || !(std::abs(number[0]) <= kMost) ? otherwise
-                                                           : static_cast<int>(number[0]);
+  constexpr double kMaxCount = 1e9;  // larger numbers do not fit an int
+  return number.empty() || !(std::abs(number[0]) <= kMaxCount) ? otherwise
+                                                               : static_cast<int>(number[0]);
 }
 
-DicomHeader HeaderOf(const gdcm::Scanner& scanner, const std::string& file) {
+DicomHeader MakeHeader(const gdcm::Scanner& scanner, const std::string& file) {
   const auto text = [&](const gdcm::Tag& tag) { return Text(scanner, file, tag); };
   DicomHeader header{.file = file,
                      .series_uid = text(tags::kSeries),
@@ -329,13 +330,13 @@ DicomHeader HeaderOf(const gdcm::Scanner& scanner, const std::string& file) {
     header.along_rows = Vec3(o[3], o[4], o[5]).normalized();
   }
   if (!s.empty()) {
-    header.spacing_mm = Vec2(s[1], s[0]);  // the tag has that between rows first
+    header.spacing_mm = Vec2(s[1], s[0]);  // the tag has the spacing between rows first
   }
   return header;
 }
 
-// "DICM" behind 128 bytes, and not the table of contents of a disc. GDCM looks into other files
-// too, and some of them end the program.
+// True for a file with "DICM" after 128 bytes that is not the table of contents of a disc. GDCM
+// would scan other files too, and some of them end the program.
 bool CanBeSlice(const std::filesystem::path& file) {
   if (file.filename().string().starts_with("DICOMDIR")) {
     return false;
@@ -346,7 +347,7 @@ bool CanBeSlice(const std::filesystem::path& file) {
   return in && std::string_view(head.data() + 128, 4) == "DICM";
 }
 
-void Put(gdcm::DataSet& data, const gdcm::Tag& tag, const gdcm::VR& vr, std::string text) {
+void PutTag(gdcm::DataSet& data, const gdcm::Tag& tag, const gdcm::VR& vr, std::string text) {
   if (text.size() % 2 != 0) {
     text.push_back(vr == gdcm::VR::UI ? '\0' : ' ');
   }
@@ -359,22 +360,22 @@ void Put(gdcm::DataSet& data, const gdcm::Tag& tag, const gdcm::VR& vr, std::str
 void PutNames(const DicomSeriesNames& names, int slice, double thickness_mm, gdcm::DataSet& data) {
   using gdcm::VR;
   const auto uid = [&](int part) { return fmt::format("2.25.{}{:05}", names.number, part); };
-  Put(data, tags::kImageType, VR::CS, "DERIVED\\SECONDARY\\AXIAL");
-  Put(data, tags::kSopClass, VR::UI, "1.2.840.10008.5.1.4.1.1.2");  // CT image
-  Put(data, tags::kSopInstance, VR::UI, uid(100 + slice));
-  Put(data, tags::kStudy, VR::UI, uid(1));
-  Put(data, tags::kSeries, VR::UI, uid(2));
-  Put(data, tags::kFrame, VR::UI, uid(3));
-  Put(data, tags::kStudyDate, VR::DA, "20000101");  // else GDCM writes today's
-  Put(data, tags::kStudyTime, VR::TM, "000000");
-  Put(data, tags::kModality, VR::CS, "CT");
-  Put(data, tags::kDescription, VR::LO, names.description);
-  Put(data, tags::kPatient, VR::PN, names.patient);
-  Put(data, tags::kPatientId, VR::LO, names.patient);
-  Put(data, tags::kPatientPosition, VR::CS, "HFS");
-  Put(data, tags::kSeriesNumber, VR::IS, "1");
-  Put(data, tags::kInstance, VR::IS, fmt::format("{}", slice + 1));
-  Put(data, tags::kThickness, VR::DS, fmt::format("{:.6g}", thickness_mm));
+  PutTag(data, tags::kImageType, VR::CS, "DERIVED\\SECONDARY\\AXIAL");
+  PutTag(data, tags::kSopClass, VR::UI, "1.2.840.10008.5.1.4.1.1.2");  // CT image
+  PutTag(data, tags::kSopInstance, VR::UI, uid(100 + slice));
+  PutTag(data, tags::kStudy, VR::UI, uid(1));
+  PutTag(data, tags::kSeries, VR::UI, uid(2));
+  PutTag(data, tags::kFrame, VR::UI, uid(3));
+  PutTag(data, tags::kStudyDate, VR::DA, "20000101");  // otherwise GDCM writes the current date
+  PutTag(data, tags::kStudyTime, VR::TM, "000000");
+  PutTag(data, tags::kModality, VR::CS, "CT");
+  PutTag(data, tags::kDescription, VR::LO, names.description);
+  PutTag(data, tags::kPatient, VR::PN, names.patient);
+  PutTag(data, tags::kPatientId, VR::LO, names.patient);
+  PutTag(data, tags::kPatientPosition, VR::CS, "HFS");
+  PutTag(data, tags::kSeriesNumber, VR::IS, "1");
+  PutTag(data, tags::kInstance, VR::IS, fmt::format("{}", slice + 1));
+  PutTag(data, tags::kThickness, VR::DS, fmt::format("{:.6g}", thickness_mm));
 }
 
 void PutVoxels(const CtVolume& volume, int slice, gdcm::Image& image) {
@@ -405,25 +406,25 @@ void PutVoxels(const CtVolume& volume, int slice, gdcm::Image& image) {
 VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat format) {
   SilenceLibraries();
   const std::string where = file.string();
-  const Reader reader = ReaderOf(format);
+  const Reader reader = MakeReader(format);
   CheckForLibrary(file, format);
   try {
     if (!reader.io->CanReadFile(where.c_str())) {
       throw IoError(
-          fmt::format("{}: it is no {} file, or its header is damaged", where, reader.name));
+          fmt::format("{}: it is not a {} file, or its header is damaged", where, reader.name));
     }
-    const HeaderPlace place = PlaceOf(file, format);
+    const HeaderPlace place = ReadPlace(file, format);
     reader.io->SetFileName(where);
     reader.io->ReadImageInformation();
-    VoxelArray array = GeometryOf(*reader.io, file);
+    VoxelArray array = ReadGeometry(*reader.io, file);
     CheckWhole(file, format, *reader.io);
-    TakePlace(place, array);
+    ApplyPlace(place, array);
     array.values.reserve(VoxelCount(array));
     AppendVoxels(*reader.io, VoxelCount(array), array, where);
     return array;
   } catch (const itk::ExceptionObject& error) {
     throw IoError(
-        fmt::format("{}: the {} file cannot be read: {}", where, reader.name, WordsOf(error)));
+        fmt::format("{}: the {} file cannot be read: {}", where, reader.name, ErrorText(error)));
   }
 }
 
@@ -445,7 +446,7 @@ std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& fil
   std::vector<DicomHeader> headers;
   for (const std::string& name : names) {
     if (scanner.IsKey(name.c_str())) {
-      headers.push_back(HeaderOf(scanner, name));
+      headers.push_back(MakeHeader(scanner, name));
     }
   }
   return headers;
@@ -460,7 +461,7 @@ void AppendDicomSlice(const DicomHeader& header, VoxelArray& array) {
     CheckClaim(*io, header.file);
     AppendVoxels(*io, static_cast<std::size_t>(header.columns) * header.rows, array, where);
   } catch (const itk::ExceptionObject& error) {
-    throw IoError(fmt::format("{}: its pixels cannot be read: {}", where, WordsOf(error)));
+    throw IoError(fmt::format("{}: its pixels cannot be read: {}", where, ErrorText(error)));
   }
 }
 
@@ -481,7 +482,7 @@ std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSerie
 void WriteImageVolume(const CtVolume& volume, const std::filesystem::path& file,
                       VolumeFormat format) {
   SilenceLibraries();
-  const itk::ImageIOBase::Pointer io = ReaderOf(format).io;
+  const itk::ImageIOBase::Pointer io = MakeReader(format).io;
   const std::array<int, 3> counts = {volume.columns, volume.rows, volume.slices};
   itk::ImageIORegion region(3);
   io->SetNumberOfDimensions(3);
@@ -503,7 +504,7 @@ void WriteImageVolume(const CtVolume& volume, const std::filesystem::path& file,
   try {
     io->Write(volume.values.data());
   } catch (const itk::ExceptionObject& error) {
-    throw IoError(fmt::format("{}: cannot be written: {}", file.string(), WordsOf(error)));
+    throw IoError(fmt::format("{}: cannot be written: {}", file.string(), ErrorText(error)));
   }
 }
 

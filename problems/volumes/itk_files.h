@@ -1,20 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Files that ITK and its GDCM read and write. The only place where the project knows of them:
-// itk_files.cc where they are installed, itk_files_off.cc, where each of these throws, elsewhere.
-// The readers are called in a process of their own (itk_files_apart.cc).
+// Reads and writes files through ITK and its GDCM. Only itk_files.cc includes these libraries. It
+// is built if ITK is installed; otherwise itk_files_off.cc is built, in which every function
+// throws. read_volume.cc calls the readers in a child process.
 #pragma once
 
 #include <cstdint>
 #include <filesystem>
 #include <optional>
-#include <span>
-#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "problems/volumes/ct_volume.h"
-#include "problems/volumes/voxel_array.h"
 
 namespace semblance {
 
@@ -24,7 +21,7 @@ enum class VolumeFormat { kNifti, kNrrd, kMetaImage };
 // for more than three axes.
 VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat format);
 
-// What a DICOM file says of itself; empty where it says nothing.
+// The tags of a DICOM file that this program uses; an absent tag leaves the default.
 struct DicomHeader {
   std::filesystem::path file;
   std::string series_uid, series_number, description, modality, image_type;
@@ -34,37 +31,23 @@ struct DicomHeader {
   std::optional<Vec2> spacing_mm;                 // between columns, between rows
 };
 
-// Of those of the files that are DICOM (with its mark behind 128 bytes), in the order given.
+// The headers of those files that are DICOM ("DICM" after 128 bytes), in the given order.
 std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& files);
 
 // Appends the values of one slice of header.columns x header.rows, slope and intercept applied.
 void AppendDicomSlice(const DicomHeader& header, VoxelArray& array);
 
-// The readers in a process of their own: a file that makes ITK or GDCM end its process, or take all
-// memory, is an IoError that names the file. Throw Cancelled soon after a stop is asked for.
-
-// As ReadImageVolume.
-VoxelArray ReadImageApart(const std::filesystem::path& file, VolumeFormat format,
-                          const std::stop_token& stop);
-
-// As ScanDicom.
-std::vector<DicomHeader> ScanDicomApart(const std::vector<std::filesystem::path>& files,
-                                        const std::stop_token& stop);
-
-// The voxels of slices of one size, one behind the other, as AppendDicomSlice appends them.
-VoxelArray ReadSlicesApart(std::span<const DicomHeader> slices, const std::stop_token& stop);
-
-// What is written into the files of a series beside the voxels.
+// The tags that EncodeDicomSlice writes in addition to the voxels and their place.
 struct DicomSeriesNames {
   std::string patient, description;
-  std::uint64_t number = 1;  // of all UIDs: another number, another study
+  std::uint64_t number = 1;  // part of all UIDs: another number makes another study
 };
 
 // The bytes of a DICOM file (CT image, 16 bit, uncompressed) with one slice of the volume.
 std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSeriesNames& names);
 
-// The volume (16 bit, with its place in space) in one file whose name's ending is of the format.
-// Throws IoError if it cannot be written.
+// Writes the volume (16 bit, with its place in space) to one file. The ending of the file's name
+// must be one of the format. Throws IoError if it cannot be written.
 void WriteImageVolume(const CtVolume& volume, const std::filesystem::path& file,
                       VolumeFormat format);
 

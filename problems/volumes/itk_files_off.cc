@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Built where ITK is not installed.
+// Replaces itk_files.cc if ITK is not installed: every function throws.
 #include <fmt/format.h>
 
 #include "problems/volumes/itk_files.h"
@@ -10,8 +10,8 @@ namespace {
 
 [[noreturn]] void ThrowNoItk(const std::string& what) {
   throw IoError(fmt::format(
-      "{}: this program was built without ITK, and so knows no DICOM, NIfTI, NRRD or MetaImage; "
-      "install libinsighttoolkit5-dev and build again",
+      "{}: this program was built without ITK, and so cannot read or write DICOM, NIfTI, NRRD or "
+      "MetaImage; install libinsighttoolkit5-dev and build again",
       what));
 }
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A volume from whatever file or folder holds one.
+// Reads a volume from any supported file or folder.
 #pragma once
 
 #include <filesystem>
@@ -14,31 +14,32 @@
 namespace semblance {
 
 struct ReadVolumeOptions {
-  std::string series;        // of a DICOM folder: UID or number; empty where there is only one
-  bool fill_slices = false;  // missing slices are interpolated, of doubled ones the first is taken
+  std::string series;        // UID or number in a DICOM folder; empty if there is only one series
+  bool fill_slices = false;  // interpolates missing slices, and uses the first of doubled slices
 };
 
-// What the voxels' values are: kUnknown where the file does not say; Hounsfield units are expected.
+// The kind of values; kUnknown if the file does not state it, then Hounsfield units are expected.
 enum class Modality { kUnknown, kCt, kMr };
 
 struct VolumeReading {
   CtVolume volume;
   Modality modality = Modality::kUnknown;
-  std::vector<std::string> notes;  // what people should know of how it was read, a line each
+  std::vector<std::string> notes;  // for people: how the volume was read, a line each
 };
 
-// A folder of DICOM files (also in folders within it), NIfTI (.nii, .nii.gz), NRRD (.nrrd, .nhdr),
-// MetaImage (.mha, .mhd) or an InVesalius project (.inv3). Slices of DICOM are sorted along their
-// normal; those of a tilted gantry make skew axes, and nothing is resampled. Throws IoError or
-// InputError with one clear line for what cannot be used, and with a line for each series where
-// several could be meant.
+// Reads a folder of DICOM files (with its sub-folders), NIfTI (.nii, .nii.gz), NRRD (.nrrd, .nhdr),
+// MetaImage (.mha, .mhd) or an InVesalius project (.inv3). DICOM slices are sorted along their
+// normal; those of a tilted gantry make skew axes, and nothing is resampled. ITK and GDCM read in a
+// child process, because some damaged files make them end the process. Throws IoError or InputError
+// with one line for what cannot be used, and with a line for each series if several match. Throws
+// Cancelled soon after a stop is requested.
 VolumeReading ReadVolume(const std::filesystem::path& path, const ReadVolumeOptions& options,
                          const RunContext& context);
 
-// Of a file with a whole volume, by its name's ending; nothing for other endings.
+// The format of a file with a whole volume, by the ending of its name; empty for other endings.
 std::optional<VolumeFormat> VolumeFormatOf(const std::filesystem::path& file);
 
-// The files that ReadVolume looks at: the path itself, or what is in the folder, sorted.
+// The files that ReadVolume reads: the path itself, or all files below the folder, sorted.
 std::vector<std::filesystem::path> VolumeFiles(const std::filesystem::path& path);
 
 }  // namespace semblance

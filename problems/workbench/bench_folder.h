@@ -14,7 +14,7 @@
 #include <string>
 #include <string_view>
 
-#include "problems/output/folder_claim.h"
+#include "problems/output/staged_folder.h"
 #include "problems/pipeline/experiment.h"
 #include "problems/workbench/bench_history.h"
 

@@ -12,9 +12,9 @@
 #include <system_error>
 #include <utility>
 
-#include "problems/ct/mr_skin.h"
+#include "problems/ct/import_ct.h"
 #include "problems/landmark_files/read_landmarks.h"
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/volumes/read_volume.h"
 #include "problems/workbench/bench_actions.h"

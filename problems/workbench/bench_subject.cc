@@ -7,7 +7,7 @@
 #include <initializer_list>
 
 #include "problems/landmark_files/read_landmarks.h"
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/subject/phantom.h"
 #include "problems/view/view_mesh.h"

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzzes the reader of configurations: what is read can be written and reads back to the same text,
-// anything else is one of our errors.
+// Fuzzes the reader of configurations. A configuration that is read can be written, and reads back
+// to the same text; any other input is an Error of this program.
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>

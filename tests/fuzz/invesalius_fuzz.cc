@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzzes the reader of InVesalius projects: a volume that is read is sound, anything else is one of
-// our errors.
+// Fuzzes the reader of InVesalius projects. A volume that is read is valid; any other input is an
+// Error of this program.
 #include <sys/mman.h>
 #include <unistd.h>
 

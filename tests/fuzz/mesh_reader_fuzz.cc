@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzzes the readers of meshes: a mesh that is read is sound, anything else an InputError. The
-// input is the file itself; its first byte tells which reader: 'p' PLY, 'O', 'C' or 'N' OFF, 's' or
-// one that cannot be printed STL, any other OBJ.
+// Fuzzes the readers of meshes. A mesh that is read is valid; any other input is an InputError. The
+// input is the file itself. Its first byte selects the reader: 'p' PLY; 'O', 'C' or 'N' OFF; 's' or
+// a byte that cannot be printed STL; any other OBJ.
 #include <cstdint>
 #include <cstdlib>
 #include <string_view>
@@ -39,7 +39,7 @@ TriMesh Read(std::string_view bytes) {
                                     : semblance::ReadObj(bytes, "fuzz.obj");
 }
 
-void AbortUnlessSound(const TriMesh& mesh) {
+void AbortUnlessValid(const TriMesh& mesh) {
   for (const semblance::Vec3& p : mesh.points) {
     if (!p.allFinite()) {
       std::abort();
@@ -58,7 +58,7 @@ void AbortUnlessSound(const TriMesh& mesh) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
-    AbortUnlessSound(Read({reinterpret_cast<const char*>(data), size}));
+    AbortUnlessValid(Read({reinterpret_cast<const char*>(data), size}));
   } catch (const semblance::InputError&) {
   }
   return 0;

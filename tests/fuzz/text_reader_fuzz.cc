@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzzes the readers of texts and arrays: what is read is finite and can be written and read back,
-// anything else is one of our errors. The first byte tells which reader: c CSV of points, n NPY,
-// h H-spline, f .fcsv, m .mrk.json, p .pp, t point list, l landmark table, v condition on values.
+// Fuzzes the readers of texts and arrays. Numbers that are read are finite, and an H-spline can be
+// written and read back; any other input is an Error of this program. The first byte selects the
+// reader: c CSV of points, n NPY, h H-spline, f .fcsv, m .mrk.json, p .pp, t point list, l landmark
+// table, any other a condition on values.
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -22,17 +23,17 @@ namespace {
 
 using semblance::LandmarkFile;
 
-void Demand(bool law) {
-  if (!law) {
+void Require(bool condition) {
+  if (!condition) {
     std::abort();
   }
 }
 
 void ReadPoints(std::string_view bytes) {
   const semblance::PointTable table = semblance::ParsePointTable(bytes, "fuzz");
-  Demand(!table.positions.empty());
+  Require(!table.positions.empty());
   for (const semblance::Vec3& p : table.positions) {
-    Demand(p.allFinite());
+    Require(p.allFinite());
   }
 }
 
@@ -42,26 +43,26 @@ void ReadArray(std::string_view bytes) {
   for (const std::size_t n : array.shape) {
     count *= n;
   }
-  Demand(array.values.size() == count);
+  Require(array.values.size() == count);
 }
 
 void ReadSurface(std::string_view bytes) {
   const semblance::HSplineSurface surface = semblance::HSplineFromJson(bytes, "fuzz");
   const std::string text = semblance::HSplineToJson(surface);
-  Demand(semblance::HSplineToJson(semblance::HSplineFromJson(text, "fuzz")) == text);
+  Require(semblance::HSplineToJson(semblance::HSplineFromJson(text, "fuzz")) == text);
 }
 
-void Look(const LandmarkFile& file) {
+void CheckFinite(const LandmarkFile& file) {
   for (const semblance::Landmark& landmark : file.landmarks) {
     for (const double x : landmark.point) {
-      Demand(std::isfinite(x));
+      Require(std::isfinite(x));
     }
   }
 }
 
 void ReadTable(std::string_view bytes) {
   std::vector<std::string> ignored;
-  Look(semblance::ParseLandmarkTable(bytes, "fuzz", ignored));
+  CheckFinite(semblance::ParseLandmarkTable(bytes, "fuzz", ignored));
 }
 
 void ReadCondition(std::string_view bytes) {
@@ -79,13 +80,13 @@ void Read(char kind, std::string_view bytes) {
     case 'h':
       return ReadSurface(bytes);
     case 'f':
-      return Look(semblance::ParseFcsv(bytes, "fuzz"));
+      return CheckFinite(semblance::ParseFcsv(bytes, "fuzz"));
     case 'm':
-      return Look(semblance::ParseMarkupsJson(bytes, "fuzz"));
+      return CheckFinite(semblance::ParseMarkupsJson(bytes, "fuzz"));
     case 'p':
-      return Look(semblance::ParseMeshLabPoints(bytes, "fuzz"));
+      return CheckFinite(semblance::ParseMeshLabPoints(bytes, "fuzz"));
     case 't':
-      return Look(semblance::ParsePointList(bytes, "fuzz"));
+      return CheckFinite(semblance::ParsePointList(bytes, "fuzz"));
     case 'l':
       return ReadTable(bytes);
     default:

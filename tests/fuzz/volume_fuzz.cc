@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fuzzes the readers of volumes: a volume that is read is sound, anything else is one of our
-// errors, also where ITK or GDCM, which come as they are installed, end the process that reads it.
-// The first byte tells the kind: n NIfTI, z NIfTI gzipped, r NRRD, m MetaImage, d a DICOM slice,
-// which with copies of it makes a series.
+// Fuzzes the readers of volumes. A volume that is read is valid; any other input is an Error of
+// this program, also if ITK or GDCM end the child process that reads it. These two libraries are
+// the installed ones, without instrumentation. The first byte selects the format: n NIfTI, z
+// gzipped NIfTI, r NRRD, m MetaImage, any other a DICOM slice, which makes a series with copies of
+// itself.
 #include <unistd.h>
 
 #include <cstdint>
@@ -19,7 +20,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// On a disk in memory where there is one; gone at the end.
+// A folder that is removed at the end, on a disk in memory if there is one.
 class Scratch {
  public:
   Scratch() : root_(Place()) { fs::create_directories(root_); }
@@ -43,11 +44,10 @@ class Scratch {
   fs::path root_;
 };
 
-// As many as a series must have.
+// The least number of slices of a head (dicom_series.cc).
 constexpr int kSlices = 8;
 
-// The slice that lies 2 mm times `slice` higher, where the text of the first one's position is
-// found.
+// A copy of the slice, moved up by 2 mm times `slice` if its position has the expected text.
 std::string SliceAt(std::string bytes, int slice) {
   const std::string place = "0\\0\\0 ";
   if (const std::size_t at = bytes.find(place); at != std::string::npos) {
@@ -58,7 +58,7 @@ std::string SliceAt(std::string bytes, int slice) {
   return bytes;
 }
 
-fs::path Laid(const Scratch& scratch, char kind, const std::string& bytes) {
+fs::path WriteInput(const Scratch& scratch, char kind, const std::string& bytes) {
   switch (kind) {
     case 'n':
       return scratch.Write("a.nii", bytes);
@@ -85,7 +85,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   const std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
-    const fs::path path = Laid(scratch, static_cast<char>(data[0]), bytes);
+    const fs::path path = WriteInput(scratch, static_cast<char>(data[0]), bytes);
     semblance::CheckVolume(semblance::ReadVolume(path, {}, {}).volume, "fuzz");
   } catch (const semblance::Error&) {
   }

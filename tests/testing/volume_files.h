@@ -25,7 +25,7 @@
 #include "problems/phantom/phantom_ct.h"
 #include "problems/volumes/itk_files.h"
 #include "problems/volumes/read_volume.h"
-#include "problems/volumes/voxel_array.h"
+#include "problems/volumes/ct_volume.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scratch_file.h"

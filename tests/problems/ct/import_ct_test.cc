@@ -4,8 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "problems/ct/half_maximum_edge.h"
-#include "problems/ct/mr_skin.h"
+#include "problems/ct/volume_surface.h"
 #include "surfaces/marching/polygonize.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/ct_phantom.h"
@@ -22,7 +21,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::WordsOf;
 
-double FurthestFromBall(const TriMesh& mesh, const Vec3& centre, double radius_mm) {
+double LargestDistanceFromBall(const TriMesh& mesh, const Vec3& centre, double radius_mm) {
   double furthest = 0;
   for (const Vec3& p : mesh.points) {
     furthest = std::max(furthest, std::abs((p - centre).norm() - radius_mm));
@@ -36,20 +35,20 @@ class ImportCtTest : public ::testing::Test {
   CtVolume volume_ = head_.Make();
 };
 
-TEST_F(ImportCtTest, SkinIsTheOutsideAloneWithoutAirwaysOrHolder) {
+TEST_F(ImportCtTest, TheSkinHasNoAirwaysAndNoHolder) {
   const CtImport import = ImportCt(volume_, {}, {});
   int in_nostril = 0;
   for (const Vec3& p : import.skin.points) {
     const double off = (p - head_.centre).norm() - head_.skin_mm;
-    EXPECT_LT(off, 1) << p.transpose();  // the holder is gone
+    EXPECT_LT(off, 1) << p.transpose();  // the holder is removed
     in_nostril += off < -2 ? 1 : 0;
   }
-  // Only the plug of the nostril is not on the ball.
+  // Only the plug of the nostril is off the ball.
   EXPECT_LT(in_nostril, static_cast<int>(import.skin.points.size() / 50));
   EXPECT_EQ(ConnectedComponents(import.skin).count, 1);
 }
 
-TEST_F(ImportCtTest, NarrowOpeningsAreFollowedIfAskedTo) {
+TEST_F(ImportCtTest, WithoutALimitNarrowOpeningsAreFollowed) {
   CtImportOptions options;
   options.widest_opening_mm = 0;
   double deepest = 0;
@@ -59,7 +58,7 @@ TEST_F(ImportCtTest, NarrowOpeningsAreFollowedIfAskedTo) {
   EXPECT_GT(deepest, 20);  // through the nostril to the sinus
 }
 
-TEST_F(ImportCtTest, SkullHasItsInnerSideAndNoSpeck) {
+TEST_F(ImportCtTest, TheSkullHasItsInnerSideAndNoSpeck) {
   const CtImport import = ImportCt(volume_, {}, {});
   bool inner = false;
   for (const Vec3& p : import.skull.points) {
@@ -71,7 +70,7 @@ TEST_F(ImportCtTest, SkullHasItsInnerSideAndNoSpeck) {
   EXPECT_GE(import.dropped_bone, 0);
 }
 
-// The table may be the last that the scanner sees.
+// The table may be close to the side of the volume.
 TEST_F(ImportCtTest, AHolderAtTheSideOfTheVolumeIsNotTheHead) {
   CtVolume cut = volume_;
   cut.rows -= 3;  // the holder ends 2 mm from the side
@@ -86,14 +85,14 @@ TEST_F(ImportCtTest, AHolderAtTheSideOfTheVolumeIsNotTheHead) {
   }
 }
 
-TEST_F(ImportCtTest, WhatIsLeftOutIsTold) {
+TEST_F(ImportCtTest, DroppedObjectsAreNoted) {
   const CtImport import = ImportCt(volume_, {}, {});
   EXPECT_THAT(import.notes,
-              Contains(AllOf(HasSubstr("1 of 1 cm^3 and more"), HasSubstr("; 1 smaller"))));
+              Contains(AllOf(HasSubstr("1 of at least 1 cm^3"), HasSubstr("; 1 smaller"))));
   EXPECT_THAT(import.notes, Not(Contains(HasSubstr("metal"))));
 }
 
-// The same head elsewhere in space, turned and with a tilted gantry: voxel by voxel the same.
+// The same head at another place, turned and with a tilted gantry, gives the same voxels.
 TEST_F(ImportCtTest, SurfacesFollowTheAxesOfTheVolume) {
   CtVolume moved = volume_;
   moved.origin = Vec3(-300, 200, -900);
@@ -110,8 +109,8 @@ TEST_F(ImportCtTest, SurfacesFollowTheAxesOfTheVolume) {
   }
 }
 
-// A filling between the two sides of the bone, and a fan of bright lines from it.
-TEST_F(ImportCtTest, StreaksOfMetalAreNoBone) {
+// A filling between the two sides of the bone, and a bright streak across the brain.
+TEST_F(ImportCtTest, StreaksOfMetalAreRemovedFromTheBone) {
   const Vec3 metal = head_.centre + Vec3(0, -36, 0);
   CtVolume streaked = volume_;
   const int slice = static_cast<int>(std::lround(metal.z() / 1.5));
@@ -138,7 +137,7 @@ TEST_F(ImportCtTest, StreaksOfMetalAreNoBone) {
   keep.smallest_bone_cm2 = 0;
   CtImportOptions take = keep;
   keep.thinnest_bone_mm = 0;
-  take.thinnest_bone_mm = 4;  // of voxels of 1.5 mm
+  take.thinnest_bone_mm = 4;  // with voxels of 1.5 mm
   EXPECT_LT(deepest(keep), 5);
   EXPECT_GT(deepest(take), 15);
   EXPECT_THAT(ImportCt(streaked, take, {}).notes, Contains(HasSubstr("metal: 1 pieces")));
@@ -189,7 +188,7 @@ TEST_F(ImportCtTest, ThresholdsThinTissueAndHalfMaximumDoesNot) {
   EXPECT_THAT(half.notes, Contains(HasSubstr("edges at half maximum")));
 }
 
-TEST_F(ImportCtTest, ThreadsChangeNoBit) {
+TEST_F(ImportCtTest, ThreadsDoNotChangeTheResult) {
   RunContext two;
   two.threads = 2;
   CtImportOptions options;
@@ -200,7 +199,7 @@ TEST_F(ImportCtTest, ThreadsChangeNoBit) {
   EXPECT_EQ(a.skin.triangles, b.skin.triangles);
 }
 
-TEST_F(ImportCtTest, VolumesWithoutAHeadAreOneClearError) {
+TEST_F(ImportCtTest, AVolumeWithoutAHeadIsAClearError) {
   CtVolume air = volume_;
   std::fill(air.values.begin(), air.values.end(), -1000);
   EXPECT_THAT(WordsOf<InputError>([&] { ImportCt(air, {}, {}); }),
@@ -216,8 +215,8 @@ TEST_F(ImportCtTest, VolumesWithoutAHeadAreOneClearError) {
               HasSubstr("no air below -200 HU"));
 }
 
-// A header is all that says where voxels lie: subject.units is for meshes.
-TEST_F(ImportCtTest, WhatIsTooSmallForAHeadIsToldWithWhatToDo) {
+// The header alone gives the unit of a volume; subject.units applies to meshes.
+TEST_F(ImportCtTest, AVolumeTooSmallForAHeadIsRefusedWithARemedy) {
   const auto to_do = HasSubstr(
       "it looks like centimetres; multiply spacing and origin in the "
       "volume's header by 10");
@@ -231,7 +230,7 @@ TEST_F(ImportCtTest, WhatIsTooSmallForAHeadIsToldWithWhatToDo) {
               AllOf(HasSubstr("import-ct: the skull: its longest side is 26"), to_do));
 }
 
-// A slope blurred evenly crosses half its height where its edge is, wherever the threshold was.
+// An evenly blurred edge crosses half its height at the edge, whatever the threshold was.
 TEST_F(ImportCtTest, HalfMaximumFindsTheEdgeOfABlurredBall) {
   TriMesh ball = testing::SphereMesh(head_.centre + Vec3(0, 0, 0), head_.skin_mm + 0.4, 60);
   std::vector<bool> keep;
@@ -241,7 +240,20 @@ TEST_F(ImportCtTest, HalfMaximumFindsTheEdgeOfABlurredBall) {
   }
   ball = Submesh(ball, keep);
   EXPECT_NEAR(MoveToHalfMaximum(volume_, {}, {}, ball), -0.4, 0.1);
-  EXPECT_LT(FurthestFromBall(ball, head_.centre, head_.skin_mm), 0.2);
+  EXPECT_LT(LargestDistanceFromBall(ball, head_.centre, head_.skin_mm), 0.2);
+}
+
+// An edge stays where the mean of a voxel is midway, so the balls keep their size within a part of
+// the coarser voxels.
+TEST_F(ImportCtTest, ACoarserImportKeepsTheEdgesAndIsNoted) {
+  const CtImport import =
+      ImportCt(volume_, {.skin_hu = -480, .coarsen = {.pixel_mm = 3, .slice_mm = 3}}, {});
+  EXPECT_THAT(import.notes, Contains(HasSubstr("3 x 3 x 3 mm instead of 1.5 x 1.5 x 1.5 mm")));
+  int off = 0;
+  for (const Vec3& p : import.skin.points) {
+    off += std::abs((p - head_.centre).norm() - head_.skin_mm) > 1 ? 1 : 0;
+  }
+  EXPECT_LT(off, static_cast<int>(import.skin.points.size() / 20));  // the plug of the nostril
 }
 
 }  // namespace

@@ -29,8 +29,8 @@ Vec3 Centre(std::int64_t n) {
       .cwiseProduct(kGrid.spacing_mm);
 }
 
-// The component of each voxel, -1 where there is none.
-std::vector<int> OfVoxel(const VoxelComponents& pieces) {
+// The component of each voxel; -1 outside of the mask.
+std::vector<int> ComponentOfVoxels(const VoxelComponents& pieces) {
   std::vector<int> of_voxel(kGrid.Count(), -1);
   for (const VoxelRun& run : pieces.runs) {
     std::fill_n(of_voxel.begin() + run.first, run.length, run.component);
@@ -43,7 +43,7 @@ bool ShareAFace(std::int64_t a, std::int64_t b) {
   return std::lround(d.sum()) == 1;
 }
 
-TEST(VoxelMask, GrowIsTheBruteForceDistance) {
+TEST(VoxelMask, DilationMatchesBruteForceDistances) {
   const VoxelMask mask = RandomMask(1, 0.02);
   for (const double reach : {0.0, 0.9, 2.1, 4.0}) {
     const VoxelMask grown = Dilate(mask, kGrid, reach, 2);
@@ -57,7 +57,7 @@ TEST(VoxelMask, GrowIsTheBruteForceDistance) {
   }
 }
 
-TEST(VoxelMask, PiecesAreThoseOfAGraphSearch) {
+TEST(VoxelMask, VoxelsThatShareAFaceAreInOneComponent) {
   const VoxelMask mask = RandomMask(2, 0.35);
   const VoxelComponents pieces = LabelComponents(mask, kGrid);
   std::int64_t total = 0;
@@ -65,7 +65,7 @@ TEST(VoxelMask, PiecesAreThoseOfAGraphSearch) {
     total += size;
   }
   EXPECT_EQ(total, std::count(mask.begin(), mask.end(), 1));
-  const std::vector<int> of_voxel = OfVoxel(pieces);
+  const std::vector<int> of_voxel = ComponentOfVoxels(pieces);
   for (std::int64_t a = 0; a < kGrid.Count(); ++a) {
     EXPECT_EQ(of_voxel[a] < 0, mask[a] == 0);
     for (std::int64_t b = 0; b < a; ++b) {
@@ -76,11 +76,11 @@ TEST(VoxelMask, PiecesAreThoseOfAGraphSearch) {
   }
 }
 
-// Numbers that are as few as the pieces: no two numbers touch, and each is one piece.
-TEST(VoxelMask, PiecesAreNumberedInOrderOfTheirFirstVoxelAndHangTogether) {
+// With the test above: no two components touch, and each is connected.
+TEST(VoxelMask, ComponentsAreConnectedAndNumberedByTheirFirstVoxel) {
   const VoxelMask mask = RandomMask(5, 0.35);
   const VoxelComponents pieces = LabelComponents(mask, kGrid);
-  const std::vector<int> of_voxel = OfVoxel(pieces);
+  const std::vector<int> of_voxel = ComponentOfVoxels(pieces);
   int next = 0;
   for (std::int64_t n = 0; n < kGrid.Count(); ++n) {
     EXPECT_LE(of_voxel[n], next);
@@ -90,7 +90,7 @@ TEST(VoxelMask, PiecesAreNumberedInOrderOfTheirFirstVoxelAndHangTogether) {
     VoxelMask start(mask.size(), 0);
     start[std::find(of_voxel.begin(), of_voxel.end(), piece) - of_voxel.begin()] = 1;
     bool more = true;
-    while (more) {  // grown voxel by voxel
+    while (more) {  // grows the start by one voxel at a time
       more = false;
       for (std::int64_t a = 0; a < kGrid.Count(); ++a) {
         for (std::int64_t b = 0; b < kGrid.Count() && mask[a] && !start[a]; ++b) {
@@ -105,19 +105,19 @@ TEST(VoxelMask, PiecesAreNumberedInOrderOfTheirFirstVoxelAndHangTogether) {
   }
 }
 
-TEST(VoxelMask, AFloodIsThePiecesThatItsSeedsTouch) {
+TEST(VoxelMask, AFloodIsTheComponentsThatContainASeed) {
   const VoxelMask allowed = RandomMask(3, 0.4), seeds = RandomMask(4, 0.05);
   const VoxelMask reached = Flood(allowed, seeds, kGrid);
   const VoxelComponents pieces = LabelComponents(allowed, kGrid);
-  const std::vector<int> of_voxel = OfVoxel(pieces);
-  std::vector<bool> wet(pieces.sizes.size(), false);
+  const std::vector<int> of_voxel = ComponentOfVoxels(pieces);
+  std::vector<bool> has_seed(pieces.sizes.size(), false);
   for (std::int64_t n = 0; n < kGrid.Count(); ++n) {
     if (allowed[n] && seeds[n]) {
-      wet[of_voxel[n]] = true;
+      has_seed[of_voxel[n]] = true;
     }
   }
   for (std::int64_t n = 0; n < kGrid.Count(); ++n) {
-    EXPECT_EQ(reached[n] != 0, allowed[n] && wet[of_voxel[n]]);
+    EXPECT_EQ(reached[n] != 0, allowed[n] && has_seed[of_voxel[n]]);
   }
 }
 

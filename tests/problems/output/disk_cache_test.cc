@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using testing::ScratchFolder;
 
-constexpr std::uintmax_t kHead = 82;  // of each file: the mark and the hash
+constexpr std::uintmax_t kHead = 82;  // bytes of the mark and the hash in each file
 
 std::string Key(int n) { return Sha256OfText(std::to_string(n)); }
 
@@ -30,7 +30,7 @@ void Age(const fs::path& folder, int n, int hours) {
   fs::last_write_time(file, fs::file_time_type::clock::now() - std::chrono::hours(hours));
 }
 
-TEST(DiskCache, GivesBackWhatWasPutAndNothingElse) {
+TEST(DiskCache, ReturnsStoredValuesAndNothingElse) {
   const ScratchFolder folder;
   const DiskCache cache(folder / "cache", 1 << 20);
   EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
@@ -41,7 +41,7 @@ TEST(DiskCache, GivesBackWhatWasPutAndNothingElse) {
   EXPECT_EQ(cache.Get(Key(3)), std::nullopt);
 }
 
-TEST(DiskCache, AFileIsNoFolderForIt) {
+TEST(DiskCache, AFileInsteadOfAFolderIsAnError) {
   const ScratchFolder folder;
   WriteFileAtomically(folder / "mine", "a");
   for (const char* wrong : {"mine", "mine/cache"}) {
@@ -50,7 +50,7 @@ TEST(DiskCache, AFileIsNoFolderForIt) {
   EXPECT_EQ(ReadFileBytes(folder / "mine"), "a");
 }
 
-TEST(DiskCache, WhatIsDamagedIsMissing) {
+TEST(DiskCache, ADamagedValueCountsAsMissing) {
   const ScratchFolder folder;
   const DiskCache cache(folder.Path(), 1 << 20);
   cache.Put(Key(1), "some bytes");
@@ -63,14 +63,14 @@ TEST(DiskCache, WhatIsDamagedIsMissing) {
   EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
 }
 
-TEST(DiskCache, AboveItsLimitWhatWasUsedLongestAgoGoes) {
+TEST(DiskCache, AboveTheLimitTheLeastRecentlyUsedIsDeleted) {
   const ScratchFolder folder;
   const DiskCache cache(folder.Path(), 3 * (kHead + 100) + 10);
   for (int n = 1; n <= 3; ++n) {
     cache.Put(Key(n), std::string(100, 'x'));
     Age(folder.Path(), n, 10 - n);
   }
-  EXPECT_TRUE(cache.Get(Key(1)));  // now used last
+  EXPECT_TRUE(cache.Get(Key(1)));  // now the most recently used
   cache.Put(Key(4), std::string(100, 'x'));
   EXPECT_TRUE(cache.Get(Key(1)));
   EXPECT_FALSE(cache.Get(Key(2)));
@@ -78,7 +78,7 @@ TEST(DiskCache, AboveItsLimitWhatWasUsedLongestAgoGoes) {
   EXPECT_TRUE(cache.Get(Key(4)));
 }
 
-TEST(DiskCache, FilesOfOthersAreNeitherCountedNorDeleted) {
+TEST(DiskCache, ForeignFilesAreNeitherCountedNorDeleted) {
   const ScratchFolder folder;
   const DiskCache cache(folder.Path(), 200);
   const std::vector<fs::path> others = {folder / "my_scan.bin", folder / (Key(9) + ".bin"),
@@ -96,7 +96,7 @@ TEST(DiskCache, FilesOfOthersAreNeitherCountedNorDeleted) {
   }
 }
 
-TEST(DiskCache, ManyAtOnceReadWholeValuesOrNone) {
+TEST(DiskCache, ConcurrentReadersGetWholeValuesOrNone) {
   const ScratchFolder folder;
   const DiskCache cache(folder.Path(), 5000);
   std::vector<std::jthread> threads;
@@ -115,7 +115,7 @@ TEST(DiskCache, ManyAtOnceReadWholeValuesOrNone) {
   }
 }
 
-TEST(ImplicitCache, GivesTheSameFaceToTheBitWithoutMakingItAgain) {
+TEST(ImplicitCache, ReturnsTheSameFaceWithoutComputingItAgain) {
   const ScratchFolder folder;
   const DiskCache cache(folder.Path(), 1 << 28);
   const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 20});
@@ -125,7 +125,7 @@ TEST(ImplicitCache, GivesTheSameFaceToTheBitWithoutMakingItAgain) {
       CachedImplicitFace(phantom.skull, phantom.depth_mm, options, &cache, {});
   EXPECT_EQ(ToBytes(made),
             ToBytes(BuildImplicitFace(phantom.skull, phantom.depth_mm, options, {})));
-  // A face that nobody could make proves that the second one was read.
+  // A marked face in the cache proves that the second call reads it.
   ImplicitFace marked = made;
   marked.notes.push_back("from the cache");
   const fs::path file = *fs::directory_iterator(folder.Path());
@@ -137,7 +137,7 @@ TEST(ImplicitCache, GivesTheSameFaceToTheBitWithoutMakingItAgain) {
             ToBytes(marked));
 }
 
-TEST(ImplicitCache, BytesOfAnotherKindAreNoFace) {
+TEST(ImplicitCache, DamagedBytesAreNoFace) {
   ImplicitFace face;
   face.notes = {"a", "note"};
   const std::string bytes = ToBytes(face);

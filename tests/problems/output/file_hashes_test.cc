@@ -14,14 +14,14 @@
 namespace semblance {
 namespace {
 
-TEST(FileHashes, AreThoseOfTheFileAsItIsNow) {
+TEST(FileHashes, FollowChangesOfTheFile) {
   const testing::ScratchFolder folder;
   const auto file = folder / "skull.ply";
   FileHashes hashes;
   EXPECT_THROW(hashes.Of(file), IoError);
   for (const char* text : {"one", "two", "three"}) {
     WriteFileAtomically(file, text);
-    // The clock of a file system may be coarse: each version has a time of its own.
+    // The clock of a file system may be coarse, so each version gets a different time.
     std::filesystem::last_write_time(
         file, std::filesystem::file_time_type::clock::now() + std::chrono::hours(text[1]));
     for (int times = 0; times < 2; ++times) {
@@ -30,8 +30,7 @@ TEST(FileHashes, AreThoseOfTheFileAsItIsNow) {
   }
 }
 
-// What is the same by size and time is not read again.
-TEST(FileHashes, AreKept) {
+TEST(FileHashes, AreReusedIfSizeAndTimeAreEqual) {
   const testing::ScratchFolder folder;
   const auto file = folder / "skull.ply";
   WriteFileAtomically(file, "one");

@@ -26,7 +26,7 @@ using testing::ScratchFolder;
 using testing::WordsOf;
 using Names = std::set<std::string>;
 
-// Of all that lies in a folder and below.
+// The names of all files and folders below `folder`.
 Names NamesIn(const fs::path& folder) {
   Names names;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
@@ -43,7 +43,7 @@ void Fill(StagedFolder& staged) {
 
 const Names kAll = {"result.json", "pictures", "pictures/front.png", "manifest.json"};
 
-TEST(StagedFolder, NothingIsThereBeforeAllIs) {
+TEST(StagedFolder, FilesAppearTogether) {
   const ScratchFolder folder;
   StagedFolder staged(folder / "a/b", WhenNotEmpty::kRefuse);
   Fill(staged);
@@ -53,7 +53,7 @@ TEST(StagedFolder, NothingIsThereBeforeAllIs) {
   EXPECT_EQ(NamesIn(folder / "a").size(), 1 + kAll.size());
 }
 
-TEST(StagedFolder, WithoutPublishNothingIsLeftNotEvenTheFoldersAbove) {
+TEST(StagedFolder, WithoutPublishNothingRemainsNotEvenParentFolders) {
   const ScratchFolder folder;
   fs::create_directories(folder / "mine");
   {
@@ -63,7 +63,7 @@ TEST(StagedFolder, WithoutPublishNothingIsLeftNotEvenTheFoldersAbove) {
   EXPECT_EQ(NamesIn(folder.Path()), Names{"mine"});
 }
 
-TEST(StagedFolder, AnEmptyFolderIsTakenWithItsPermissions) {
+TEST(StagedFolder, AnEmptyFolderKeepsItsPermissions) {
   const ScratchFolder folder;
   fs::create_directories(folder / "out");
   fs::permissions(folder / "out", fs::perms::owner_all);
@@ -75,7 +75,7 @@ TEST(StagedFolder, AnEmptyFolderIsTakenWithItsPermissions) {
   EXPECT_EQ(fs::status(folder / "out").permissions(), fs::perms::owner_all);
 }
 
-TEST(StagedFolder, WhatElseIsInAFolderStays) {
+TEST(StagedFolder, OtherFilesInTheFolderStay) {
   const ScratchFolder folder;
   fs::create_directories(folder / "out/pictures");
   std::ofstream(folder / "out/mine.txt") << "mine";
@@ -98,7 +98,7 @@ TEST(StagedFolder, WhatElseIsInAFolderStays) {
   EXPECT_EQ(NamesIn(folder / "out"), all);
 }
 
-TEST(StagedFolder, AFolderWhereAFileBelongsStopsAllAndNothingIsLost) {
+TEST(StagedFolder, AFolderWithTheNameOfAFileStopsPublishingWithoutLoss) {
   const ScratchFolder folder;
   fs::create_directories(folder / "out/result.json");
   std::ofstream(folder / "out/manifest.json") << "old";
@@ -110,7 +110,7 @@ TEST(StagedFolder, AFolderWhereAFileBelongsStopsAllAndNothingIsLost) {
   EXPECT_EQ(NamesIn(folder / "out.kept-1"), kAll);
 }
 
-TEST(StagedFolder, WhatComesUpMeanwhileIsNotOverwritten) {
+TEST(StagedFolder, FilesThatAppearInTheMeantimeAreNotOverwritten) {
   const ScratchFolder folder;
   StagedFolder staged(folder / "out", WhenNotEmpty::kRefuse);
   Fill(staged);
@@ -121,7 +121,7 @@ TEST(StagedFolder, WhatComesUpMeanwhileIsNotOverwritten) {
   EXPECT_EQ(NamesIn(folder / "out.kept-1"), kAll);
 }
 
-TEST(StagedFolder, ASecondOneIsRefusedWhileTheFirstLives) {
+TEST(StagedFolder, ASecondStagedFolderIsRefusedWhileTheFirstExists) {
   const ScratchFolder folder;
   for (const WhenNotEmpty when : {WhenNotEmpty::kRefuse, WhenNotEmpty::kReplaceFiles}) {
     StagedFolder first(folder / "out", when);
@@ -134,7 +134,7 @@ TEST(StagedFolder, ASecondOneIsRefusedWhileTheFirstLives) {
   }
 }
 
-TEST(StagedFolder, WhatAKilledProcessHasLeftIsTakenOver) {
+TEST(StagedFolder, TheFolderOfAKilledProcessIsTakenOver) {
   for (const bool is_full : {false, true}) {
     const ScratchFolder folder;
     if (is_full) {
@@ -163,7 +163,7 @@ TEST(StagedFolder, WhatAKilledProcessHasLeftIsTakenOver) {
   }
 }
 
-TEST(StagedFolder, AGivenFileIsNotReplacedByAnyNameAndThatIsToldFirst) {
+TEST(StagedFolder, AnInputFileIsRefusedUnderAnyNameBeforeWork) {
   const ScratchFolder folder;
   fs::create_directories(folder / "out/pictures");
   std::ofstream(folder / "out/pictures/front.png") << "mine";
@@ -184,11 +184,11 @@ TEST(StagedFolder, AGivenFileIsNotReplacedByAnyNameAndThatIsToldFirst) {
   StagedFolder staged(folder / "out", WhenNotEmpty::kReplaceFiles,
                       {.files = {folder / "out/mine.txt", "-", ""}, .outputs = kOutputs});
   Fill(staged);
-  EXPECT_NO_THROW(staged.Publish()) << "it stands beside what is written";
+  EXPECT_NO_THROW(staged.Publish()) << "no output has its name";
   EXPECT_EQ(ReadFileBytes(folder / "out/mine.txt"), "mine");
 }
 
-TEST(StagedFolder, AGivenFileWhoseNameNobodyForesawStaysToo) {
+TEST(StagedFolder, AnInputFileWithAnUnexpectedNameStaysToo) {
   const ScratchFolder folder;
   fs::create_directories(folder / "out");
   std::ofstream(folder / "out/result.json") << "mine";
@@ -203,7 +203,7 @@ TEST(StagedFolder, AGivenFileWhoseNameNobodyForesawStaysToo) {
   EXPECT_EQ(NamesIn(folder / "out.kept-1"), kAll);
 }
 
-TEST(StagedFolder, AFileOfTheNameIsLeftAlone) {
+TEST(StagedFolder, AFileWithTheNameOfTheFolderIsNotChanged) {
   const ScratchFolder folder;
   std::ofstream(folder / "out") << "mine";
   EXPECT_THROW(StagedFolder(folder / "out", WhenNotEmpty::kReplaceFiles), IoError);

@@ -158,13 +158,13 @@ TEST_F(CommandLine, AFolderDoesNotTakeWhatTheCommandReads) {
   Write("out/depth.ply", "mine");
   Write("out/resolved.yaml", fmt::format("base: {}/phantom.yaml\n", kConfigs));
   const auto refused = [&](const std::string& arguments, const std::string& file) {
-    ExpectRefused(arguments + " --out out --force --quiet", "out/" + file + ": it is read here");
+    ExpectRefused(arguments + " --out out --force --quiet", "out/" + file + ": this file is read");
   };
   refused("run out/resolved.yaml", "resolved.yaml");
   refused("run ball.yaml --set 'interp={type: depth_map, file: out/depth.ply}'", "depth.ply");
   refused("depth ball.yaml --set 'interp={type: depth_map, file: out/depth.ply}'", "depth.ply");
   Write("out/table.yaml", "phantoms: {count: 3}\n");
-  ExpectRefused("population out/table.yaml --out out", "out/table.yaml: it is read here");
+  ExpectRefused("population out/table.yaml --out out", "out/table.yaml: this file is read");
   Write("e.yaml",
         "template: {type: formula, max_level: 1}\n"
         "fit: {plan: {type: coarse_to_fine, finest: 1}}\n");
@@ -172,7 +172,7 @@ TEST_F(CommandLine, AFolderDoesNotTakeWhatTheCommandReads) {
   ExpectRefused(
       "template e.yaml --out made --force --set 'template={type: file, surface: "
       "made/head.hspline.json, sites: made/sites.csv, features: made/features.json}'",
-      "made/head.hspline.json: it is read here");
+      "made/head.hspline.json: this file is read");
 }
 
 TEST_F(CommandLine, AnUnwritableFolderIsRefusedBeforeAnyWork) {

@@ -140,7 +140,7 @@ TEST_F(FaceCommands, AScaleOfModesIsAboveZeroAndBelowABillion) {
 }
 
 TEST_F(FaceCommands, NothingThatIsReadIsReplaced) {
-  const std::string words = ": it is read here, and what is read is never replaced";
+  const std::string words = ": this file is read, and input files are never replaced";
   WriteFileAtomically(folder_ / "script.yaml", "edits: []\n");
   ExpectDone("export face.json --to face.ply");
   ExpectDone("feature extract face.json --name a --library lib");

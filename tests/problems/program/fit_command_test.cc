@@ -328,7 +328,7 @@ TEST_F(FitCommand, InputFilesAreNotReplaced) {
     const std::string before = ReadFileBytes(folder_ / file);
     const auto outcome = Call("fit " + arguments + " --force --quiet");
     EXPECT_EQ(outcome.code, 2) << arguments;
-    EXPECT_THAT(outcome.err, ::testing::AllOf(HasSubstr(file + ": it is read here"),
+    EXPECT_THAT(outcome.err, ::testing::AllOf(HasSubstr(file + ": this file is read"),
                                               HasSubstr("written into " + folder + ";"),
                                               HasSubstr("give another --out")));
     EXPECT_EQ(ReadFileBytes(folder_ / file), before);

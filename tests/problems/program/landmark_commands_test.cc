@@ -48,7 +48,7 @@ TEST_F(LandmarkCommands, WhatIsReadIsNotReplacedEvenIfAsked) {
     const testing::Outcome refused =
         testing::CallProgram(folder_, std::string("landmarks ") + arguments);
     EXPECT_EQ(refused.code, 2) << arguments;
-    EXPECT_THAT(refused.err, HasSubstr("in.csv: it is read here")) << arguments;
+    EXPECT_THAT(refused.err, HasSubstr("in.csv: this file is read")) << arguments;
   }
   EXPECT_EQ(ReadFileBytes(folder_ / "in.csv"), before);
 }

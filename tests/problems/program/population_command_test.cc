@@ -100,7 +100,7 @@ TEST_F(PopulationCommand, NeverReplacesTheSubjectsCsvThatItReads) {
   WriteFileAtomically(folder_ / "heads/subjects.csv", "name,bmi\ns1,20\n");
   const testing::Outcome outcome = Call("heads --out heads --force");
   EXPECT_EQ(outcome.code, 2);
-  EXPECT_THAT(outcome.err, HasSubstr("what is read is never replaced"));
+  EXPECT_THAT(outcome.err, HasSubstr("input files are never replaced"));
   EXPECT_EQ(ReadFileBytes(folder_ / "heads/subjects.csv"), "name,bmi\ns1,20\n");
 }
 

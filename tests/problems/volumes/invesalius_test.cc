@@ -62,7 +62,7 @@ void WriteTar(const std::filesystem::path& path, const std::map<std::string, std
   archive_write_free(a);
 }
 
-TEST(Invesalius, AProjectIsReadFromFrontToBack) {
+TEST(Invesalius, RowsOfAProjectAreReadFromFrontToBack) {
   const ScratchFolder folder;
   WriteTar(folder / "x.inv3", {{"main.plist", Plist("int16", kShape)}, {"matrix.dat", Values()}});
   const CtVolume volume = ReadInvesalius(folder / "x.inv3");
@@ -92,9 +92,10 @@ TEST(Invesalius, EachFaultIsNamed) {
               HasSubstr("more than 48 bytes"));
   EXPECT_THAT(words({{"main.plist", plist + std::string(2'000'000, ' ')}}),
               HasSubstr("main.plist is larger than"));
-  const std::string most = "<integer>4096</integer>";
-  EXPECT_THAT(words({{"main.plist", Plist("int16", most + most + most)}, {"matrix.dat", Values()}}),
-              HasSubstr("at most 8 GB are read"));
+  const std::string longest_side = "<integer>4096</integer>";
+  EXPECT_THAT(words({{"main.plist", Plist("int16", longest_side + longest_side + longest_side)},
+                     {"matrix.dat", Values()}}),
+              HasSubstr("at longest_side 8 GB are read"));
   const std::string large = "<integer>500</integer>";
   EXPECT_THAT(
       words({{"main.plist", Plist("int16", large + large + large)}, {"matrix.dat", Values()}}),
@@ -106,7 +107,7 @@ TEST(Invesalius, EachFaultIsNamed) {
   EXPECT_THAT(words({{"main.plist", "<plist"}}), HasSubstr("not a property list"));
   std::ofstream(folder / "y.inv3") << "not an archive";
   EXPECT_THAT(WordsOf<IoError>([&] { ReadInvesalius(folder / "y.inv3"); }),
-              HasSubstr("no InVesalius project"));
+              HasSubstr("not an InVesalius project"));
 }
 
 }  // namespace

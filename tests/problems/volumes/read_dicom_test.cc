@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Folders of DICOM slices.
+// Tests of folders of DICOM slices.
 #include "problems/volumes/read_volume.h"
 
-#include <Eigen/Dense>  // before ITK, which else brings a part of an older one
+#include <Eigen/Dense>  // before ITK, which otherwise includes parts of an older one
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -13,7 +13,7 @@
 #include <cmath>
 #include <string>
 
-#include "problems/ct/mr_skin.h"
+#include "problems/ct/import_ct.h"
 #include "tests/testing/volume_files.h"
 
 namespace semblance {
@@ -30,7 +30,7 @@ using testing::WriteDicom;
 using testing::WriteItk;
 using ReadDicomTest = testing::VolumeFilesTest;
 
-TEST_F(ReadDicomTest, DicomIsSortedBySpaceAndDecompressed) {
+TEST_F(ReadDicomTest, SlicesAreSortedInSpaceAndDecompressed) {
   for (const char* compression : {"", "JPEG", "JPEG2000"}) {
     const std::string name = fmt::format("ct{}", compression);
     WriteDicom(folder_ / name, array_, {.compression = compression});
@@ -42,7 +42,7 @@ TEST_F(ReadDicomTest, DicomIsSortedBySpaceAndDecompressed) {
   ExpectTheSkull(Read("ct").volume);
 }
 
-TEST_F(ReadDicomTest, DicomOfSagittalSlicesAndInFoldersOfFoldersIsRead) {
+TEST_F(ReadDicomTest, SagittalSlicesInSubfoldersAreRead) {
   WriteDicom(folder_ / "disc/PA0/SE0", SagittalArrayOf(head_.volume));
   ExpectTheHead(Read("disc"));
 }
@@ -56,7 +56,7 @@ TEST_F(ReadDicomTest, SlopeAndInterceptMakeHounsfieldUnits) {
   }
 }
 
-// A turned head in the scanner: the slices' axes are not those of the head.
+// The head is turned in the scanner, so the slices' axes are not those of the head.
 TEST_F(ReadDicomTest, DirectionCosinesPlaceTheSkull) {
   CtVolume grid = head_.volume;
   const Mat3 turn = Eigen::AngleAxisd(0.2, Vec3(1, 2, 3).normalized()).toRotationMatrix();
@@ -84,7 +84,7 @@ TEST_F(ReadDicomTest, ATiltedGantryPlacesTheSkull) {
   ExpectTheSkull(reading.volume);
 }
 
-TEST_F(ReadDicomTest, MissingAndDoubledSlicesAreToldOrFilled) {
+TEST_F(ReadDicomTest, MissingAndDoubledSlicesAreErrorsUnlessFilled) {
   WriteDicom(folder_ / "ct", array_);
   const fs::path tenth = folder_ / "ct" / fmt::format("IM{:03}", (10 * 37 + 11) % 101);
   fs::copy(tenth, folder_ / "ct" / "copy");
@@ -98,7 +98,7 @@ TEST_F(ReadDicomTest, MissingAndDoubledSlicesAreToldOrFilled) {
   ExpectTheSkull(filled.volume);
 }
 
-TEST_F(ReadDicomTest, OfSeveralSeriesOneIsChosen) {
+TEST_F(ReadDicomTest, OneOfSeveralSeriesIsChosen) {
   VoxelArray scout = array_;
   scout.counts[2] = 2;
   WriteDicom(folder_ / "ct/a", array_, {.series = "1.2.3.1", .number = "2"});
@@ -118,9 +118,9 @@ TEST_F(ReadDicomTest, OfSeveralSeriesOneIsChosen) {
   EXPECT_THAT(Words("ct", {.series = "4"}), HasSubstr("no series is called '4'; the series are:"));
 }
 
-TEST_F(ReadDicomTest, OfAnMrTheSkinIsTaken) {
+TEST_F(ReadDicomTest, TheSkinOfAnMrIsExtracted) {
   VoxelArray mr = array_;
-  for (std::int16_t& value : mr.values) {  // bone dark, tissue bright, some noise in the air
+  for (std::int16_t& value : mr.values) {  // dark bone, bright tissue, some noise in the air
     value = static_cast<std::int16_t>(value > 400 ? 30 : 20 + std::max(0, (value + 1000) / 3));
   }
   WriteDicom(folder_ / "mr", mr, {.modality = "MR"});
@@ -136,8 +136,8 @@ TEST_F(ReadDicomTest, OfAnMrTheSkinIsTaken) {
   EXPECT_THAT(import.notes, Contains(HasSubstr("no skull")));
 }
 
-// GDCM ends its process at some of these, or asks for 4 GB.
-TEST_F(ReadDicomTest, DamagedSlicesAreOneClearError) {
+// GDCM ends its process at some of these, or allocates 4 GB.
+TEST_F(ReadDicomTest, ADamagedSliceIsAClearError) {
   constexpr std::size_t kMark = 132;  // bytes up to the end of "DICM"
   const DicomSeriesNames names{.patient = "P", .description = "d", .number = 4};
   const std::string good = EncodeDicomSlice(head_.volume, 0, names);

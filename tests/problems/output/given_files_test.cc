@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/output/old_files.h"
+#include "problems/output/given_files.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -22,13 +22,13 @@ using ::testing::IsEmpty;
 using testing::ScratchFolder;
 using ::testing::UnorderedElementsAre;
 
-class OldFilesTest : public ::testing::Test {
+class GivenFilesTest : public ::testing::Test {
  protected:
   void Write(const std::string& name, const std::string& bytes) const {
     fs::create_directories((folder_ / name).parent_path());
     WriteFileAtomically(folder_ / name, bytes);
   }
-  // As a run's that wrote `bytes` under each name.
+  // Writes the manifest of a run that wrote `bytes` to each file.
   void WriteManifest(const std::vector<std::string>& names, const std::string& bytes) const {
     std::string lines;
     for (const std::string& name : names) {
@@ -41,24 +41,24 @@ class OldFilesTest : public ::testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(OldFilesTest, OfARunTheyAreThoseOfItsManifestThatNobodyHasChanged) {
+TEST_F(GivenFilesTest, OldFilesOfARunAreUnchangedFilesOfItsManifest) {
   const std::vector<std::string> names = {"face.ply", "sample_0.ply", "sample_1.ply",
                                           "alternatives/a.json", "mine.txt"};
   for (const std::string& name : names) {
     Write(name, "old");
   }
   Write("sample_1.ply", "mine");
-  Write("sample_2.ply", "old");  // not of that run
+  Write("sample_2.ply", "old");  // not in the manifest
   WriteManifest(names, "old");
   EXPECT_THAT(OldFiles(folder_.Path(), {.files = {}, .outputs = kRunFiles}, {"face.ply"}),
               UnorderedElementsAre("sample_0.ply", "alternatives/a.json"));
   EXPECT_THAT(OldFiles(folder_.Path(), {.files = {folder_ / "sample_0.ply"}, .outputs = kRunFiles},
                        {"face.ply", "alternatives/a.json"}),
               IsEmpty())
-      << "what is read stays";
+      << "an input file stays";
 }
 
-TEST_F(OldFilesTest, AManifestMayHoldAnything) {
+TEST_F(GivenFilesTest, AnOddManifestHasNoOldFiles) {
   Write("outside.png", "old");
   Write("run/pictures/front.png", "old");
   for (const char* text : {"", "[]", "{\"outputs\": 1}", "{\"outputs\": [1, {}, {\"file\": 2}]}"}) {
@@ -71,7 +71,7 @@ TEST_F(OldFilesTest, AManifestMayHoldAnything) {
   EXPECT_THAT(OldFiles(folder_ / "run", {.files = {}, .outputs = kRunFiles}, {}), IsEmpty());
 }
 
-TEST_F(OldFilesTest, WithoutAManifestTheyAreThoseWithAMark) {
+TEST_F(GivenFilesTest, WithoutAManifestOldFilesAreThoseWithAMark) {
   constexpr std::array<FileMark, 1> kMarks = {FileMark{R"(part_\d+\.txt)", "made here"}};
   Write("part_1.txt", "# made here\n");
   Write("part_2.txt", "# made here\n");
@@ -82,7 +82,7 @@ TEST_F(OldFilesTest, WithoutAManifestTheyAreThoseWithAMark) {
               ElementsAre("part_2.txt"));
 }
 
-TEST_F(OldFilesTest, TheyAreGoneOnceTheNewOnesAreThere) {
+TEST_F(GivenFilesTest, PublishingRemovesOldFiles) {
   Write("out/face.ply", "old");
   Write("out/bust_textures/skin.png", "old");
   Write("out/pictures/old.png", "old");

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/output/files.h"
+#include "problems/output/output_folder.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -39,19 +39,19 @@ void RefuseIfNotEmpty(const fs::path& folder) {
   if (fs::exists(folder / kUnfinishedPart, error)) {
     throw IoError(fmt::format(
         "{}: the output folder is unfinished: its writing was cut short (killed, or the disk was "
-        "full), and some of its files are the old ones or are missing; say --force to write them "
-        "anew, or choose another folder",
+        "full), and some of its files are the old ones or are missing; add --force to write them "
+        "again, or choose another folder",
         folder.string()));
   }
   if (!is_empty) {
     throw IoError(fmt::format(
         "{}: the output folder exists and is not empty, and nothing is overwritten unless asked; "
-        "choose another folder, or say --force to replace files in it",
+        "choose another folder, or add --force to replace files in it",
         folder.string()));
   }
 }
 
-void TryToWrite(const fs::path& folder) {
+void TestWriting(const fs::path& folder) {
   const fs::path probe = folder / fmt::format(".semblance-probe.{}-0.tmp", ::getpid());
   const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
   if (descriptor < 0) {
@@ -77,11 +77,11 @@ OutputFolder::OutputFolder(fs::path root, WhenNotEmpty when_not_empty) : root_(s
   if (when_not_empty == WhenNotEmpty::kRefuse) {
     RefuseIfNotEmpty(root_);
   }
-  TryToWrite(root_);
+  TestWriting(root_);
   SweepTemporaryFiles(root_);
 }
 
-fs::path OutputFolder::PathOf(std::string_view name) const {
+fs::path OutputFolder::MakePath(std::string_view name) const {
   if (!StaysInside(name)) {
     throw InputError(fmt::format(
         "'{}': not a file name inside the output folder {}; give a relative path without '..'",
@@ -93,7 +93,7 @@ fs::path OutputFolder::PathOf(std::string_view name) const {
 }
 
 void OutputFolder::Write(std::string_view name, std::string_view bytes, Durability durability) {
-  const fs::path path = PathOf(name);
+  const fs::path path = MakePath(name);
   if (path.parent_path() != root_) {
     SweepTemporaryFiles(path.parent_path());
   }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The folder a run writes.
+// The folder that a run writes its files into.
 #pragma once
 
 #include <filesystem>
@@ -11,16 +11,16 @@
 
 namespace semblance {
 
-// What to do with a folder that already holds something. kReplaceFiles overwrites files of the same
+// The treatment of an output folder that is not empty. kReplaceFiles overwrites files of the same
 // name, one by one, and deletes nothing.
 enum class WhenNotEmpty { kRefuse, kReplaceFiles };
 
-// In a folder while its files are put there; what a killed process leaves of it says that they are
-// not all there (staged_folder.h).
+// Name of the staging folder (staged_folder.h), which exists while files are moved into its parent.
+// If a killed process leaves it, some of these files are missing.
 inline constexpr const char* kUnfinishedPart = ".semblance-part";
 
-// The folder of one run. Constructing it creates the folder (with its parents) and tries out that a
-// file can be written there, so that a wrong folder is known before any long work.
+// The constructor creates the folder (with its parents) and tests whether a file can be written
+// there, so that a wrong folder is reported before any long work.
 class OutputFolder {
  public:
   // Throws IoError if `root` is not a folder, cannot be created or written to, or holds something
@@ -29,14 +29,15 @@ class OutputFolder {
 
   const std::filesystem::path& Root() const { return root_; }
 
-  // The names that Write has written, in that order.
+  // The names of the written files, in the order of writing.
   const std::vector<std::string>& Written() const { return written_; }
 
-  // Root() / name, e.g. "pictures/front.png"; the folders in between are created. Throws InputError
-  // if `name` is empty, absolute or leads out of the folder, IoError if a folder cannot be created.
-  std::filesystem::path PathOf(std::string_view name) const;
+  // Returns Root() / name, e.g. for "pictures/front.png"; creates the folders in between. Throws
+  // InputError if `name` is empty, absolute or leads out of the folder, IoError if a folder cannot
+  // be created.
+  std::filesystem::path MakePath(std::string_view name) const;
 
-  // WriteFileAtomically(PathOf(name), bytes, durability).
+  // WriteFileAtomically(MakePath(name), bytes, durability).
   void Write(std::string_view name, std::string_view bytes,
              Durability durability = Durability::kSynced);
 
@@ -45,7 +46,7 @@ class OutputFolder {
   std::filesystem::path root_;
 };
 
-// Of a file or folder without its endings: `head` of head.nii.gz, head.ply and head/.
+// The name of a file or folder without its endings: `head` for head.nii.gz, head.ply and head/.
 std::string PlainName(const std::filesystem::path& path);
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/volumes/apart.h"
+#include "problems/volumes/child_process.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -27,16 +27,16 @@ using ::testing::StartsWith;
 
 constexpr double kMemory_bytes = 256e6;
 
-std::string Do(const std::function<std::string(const TellFile&)>& work) {
-  return DoApart(work, kMemory_bytes, {});
+std::string Do(const std::function<std::string(const ReportFile&)>& work) {
+  return RunInChildProcess(work, kMemory_bytes, {});
 }
 
 template <class Thrown>
-std::string WordsWhenDone(const std::function<void()>& work) {
+std::string MessageOfWork(const std::function<void()>& work) {
   try {
-    Do([&](const TellFile& tell) {
-      tell("a.dcm");
-      tell("b.dcm");
+    Do([&](const ReportFile& report) {
+      report("a.dcm");
+      report("b.dcm");
       work();
       return std::string();
     });
@@ -46,16 +46,16 @@ std::string WordsWhenDone(const std::function<void()>& work) {
   return "nothing was thrown";
 }
 
-TEST(Apart, WhatTheWorkGivesComesWhole) {
+TEST(ChildProcess, TheResultOfTheWorkArrivesComplete) {
   const std::string large(3'000'000, 'x');
-  EXPECT_EQ(Do([&](const TellFile&) { return large; }), large);
-  EXPECT_EQ(Do([](const TellFile&) { return std::string(); }), "");
+  EXPECT_EQ(Do([&](const ReportFile&) { return large; }), large);
+  EXPECT_EQ(Do([](const ReportFile&) { return std::string(); }), "");
 }
 
-TEST(Apart, NothingElseOfItIsSeen) {
+TEST(ChildProcess, NothingElseOfTheWorkIsVisible) {
   int here = 1;
   ::testing::internal::CaptureStderr();
-  Do([&](const TellFile&) {
+  Do([&](const ReportFile&) {
     here = 2;
     std::fputs("words of a library\n", stderr);
     std::fflush(stderr);
@@ -65,12 +65,12 @@ TEST(Apart, NothingElseOfItIsSeen) {
   EXPECT_EQ(here, 1);
 }
 
-TEST(Apart, OurErrorsStayWhatTheyAre) {
-  EXPECT_EQ(WordsWhenDone<InputError>([] { throw InputError("five axes"); }), "five axes");
-  EXPECT_EQ(WordsWhenDone<IoError>([] { throw IoError("cut short"); }), "cut short");
+TEST(ChildProcess, ErrorsOfTheProgramKeepTypeAndMessage) {
+  EXPECT_EQ(MessageOfWork<InputError>([] { throw InputError("five axes"); }), "five axes");
+  EXPECT_EQ(MessageOfWork<IoError>([] { throw IoError("cut short"); }), "cut short");
 }
 
-TEST(Apart, WhateverElseHappensNamesTheFileAtHand) {
+TEST(ChildProcess, AnyOtherFailureNamesTheLastFile) {
   const std::vector<std::function<void()>> ends = {
       [] { std::abort(); },
       [] { ::raise(SIGSEGV); },
@@ -79,46 +79,47 @@ TEST(Apart, WhateverElseHappensNamesTheFileAtHand) {
       [] { throw std::bad_alloc(); },
   };
   for (const auto& end : ends) {
-    EXPECT_THAT(WordsWhenDone<IoError>(end),
+    EXPECT_THAT(MessageOfWork<IoError>(end),
                 AllOf(StartsWith("b.dcm: "), HasSubstr("copy or export it again")));
   }
 }
 
-TEST(Apart, MemoryIsLimited) {
+TEST(ChildProcess, MemoryIsLimited) {
 #ifdef SEMBLANCE_SANITIZED
-  GTEST_SKIP() << "a sanitizer's memory has no limit";
+  GTEST_SKIP() << "a sanitizer's memory is not limited";
 #endif
-  EXPECT_THAT(WordsWhenDone<IoError>([] {
+  EXPECT_THAT(MessageOfWork<IoError>([] {
                 std::vector<char> much(static_cast<std::size_t>(4 * kMemory_bytes), 'x');
                 EXPECT_EQ(much.back(), 'x');
               }),
-              HasSubstr("asks for more memory"));
+              HasSubstr("requires more memory"));
 }
 
-TEST(Apart, WorkThatGoesRoundForEverIsEnded) {
-  const auto endless = [](const TellFile& tell) -> std::string {
-    tell("a.dcm");
+TEST(ChildProcess, EndlessWorkIsEnded) {
+  const auto endless = [](const ReportFile& report) -> std::string {
+    report("a.dcm");
     volatile bool goes_on = true;
     while (goes_on) {
     }
     return "";
   };
-  EXPECT_THAT(testing::WordsOf<IoError>([&] { DoApart(endless, /*memory_bytes=*/1e6, {}); }),
-              StartsWith("a.dcm: the library that reads it gave up on it"));
+  EXPECT_THAT(
+      testing::WordsOf<IoError>([&] { RunInChildProcess(endless, /*memory_bytes=*/1e6, {}); }),
+      StartsWith("a.dcm: the library that reads it failed or took too long"));
 }
 
-TEST(Apart, AStopEndsIt) {
+TEST(ChildProcess, AStopEndsTheWork) {
   std::stop_source stop;
   const std::jthread later([&] {
     std::this_thread::sleep_for(std::chrono::milliseconds(20));
     stop.request_stop();
   });
-  const auto endless = [](const TellFile&) -> std::string {
+  const auto endless = [](const ReportFile&) -> std::string {
     for (;;) {
       ::pause();
     }
   };
-  EXPECT_THROW(DoApart(endless, kMemory_bytes, stop.get_token()), Cancelled);
+  EXPECT_THROW(RunInChildProcess(endless, kMemory_bytes, stop.get_token()), Cancelled);
 }
 
 }  // namespace

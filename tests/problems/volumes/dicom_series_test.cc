@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/volumes/slice_stack.h"
+#include "problems/volumes/dicom_series.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ using ::testing::IsEmpty;
 using ::testing::SizeIs;
 using testing::WordsOf;
 
-// Slices at the given heights along a slanted normal, named a, b, c ...
+// Slices named a, b, c ... at the given heights along an oblique normal.
 struct Series {
   Vec3 normal = Vec3(0.1, -0.2, 1).normalized();
   std::vector<Vec3> positions;
@@ -49,7 +49,7 @@ TEST(SliceStack, SlicesAreSortedAlongTheirNormal) {
   EXPECT_THAT(stack.notes, IsEmpty());
 }
 
-TEST(SliceStack, RoundedPositionsAreNoGaps) {
+TEST(SliceStack, RoundedPositionsAreNotGaps) {
   EXPECT_THAT(Series({0, 0.62, 1.25, 1.87, 2.5, 3.12}).Stack().slices, SizeIs(6));
   EXPECT_THAT(Series({0, 0.62, 1.25, 1.87, 2.5, 3.12}).Stack().notes, IsEmpty());
 }
@@ -65,7 +65,7 @@ TEST(SliceStack, ATiltedGantryMakesASlantedStep) {
   EXPECT_LT((stack.step - (series.positions[1] - series.positions[0])).norm(), 1e-12);
 }
 
-TEST(SliceStack, AMissingSliceIsToldOrFilled) {
+TEST(SliceStack, AMissingSliceIsAnErrorUnlessFilled) {
   const Series series({0, 2, 4, 8, 10});
   EXPECT_THAT(series.Words(), AllOf(HasSubstr("ct: 1 missing slices"), HasSubstr("fill_slices")));
   const double low = series.positions[2].dot(series.normal);
@@ -73,10 +73,10 @@ TEST(SliceStack, AMissingSliceIsToldOrFilled) {
   const SliceStack stack = series.Stack({.fill = true});
   EXPECT_THAT(stack.slices, ElementsAre(0, 1, 2, -1, 3, 4));
   EXPECT_THAT(stack.notes, ElementsAre(HasSubstr("interpolated")));
-  EXPECT_THAT(Series({0, 2, 4, 18, 20}).Words({.fill = true}), HasSubstr("no more than 10 mm"));
+  EXPECT_THAT(Series({0, 2, 4, 18, 20}).Words({.fill = true}), HasSubstr("at most 10 mm"));
 }
 
-TEST(SliceStack, ADoubledSliceIsToldOrLeftOut) {
+TEST(SliceStack, ADoubledSliceIsAnErrorUnlessFilled) {
   const Series series({0, 2, 2, 4});
   EXPECT_THAT(series.Words(), AllOf(HasSubstr("1 doubled slices"), HasSubstr("(b and c)")));
   const SliceStack stack = series.Stack({.fill = true});
@@ -84,17 +84,18 @@ TEST(SliceStack, ADoubledSliceIsToldOrLeftOut) {
   EXPECT_THAT(stack.notes, ElementsAre(HasSubstr("the first of each pair")));
 }
 
-TEST(SliceStack, WhatIsNoRegularStackIsRefused) {
+TEST(SliceStack, AnIrregularStackIsRefused) {
   EXPECT_THAT(Series({0, 2, 4, 6, 9, 11}).Words({.fill = true}),
               HasSubstr("not at equal distances"));
   EXPECT_THAT(Series({0, 2, 4, 1e13, 3e13}).Words({.fill = true}),  // more steps than an int holds
               HasSubstr("not at equal distances"));
-  EXPECT_THAT(Series({3}).Words(), HasSubstr("needs 2"));
-  Series aside({0, 2, 4, 6});
-  aside.positions[2].x() += 30;
-  aside.positions[2] -=
-      (aside.positions[2] - aside.positions[1]).dot(aside.normal) * aside.normal - 2 * aside.normal;
-  EXPECT_THAT(aside.Words(), AllOf(HasSubstr("1 slices lie aside"), HasSubstr("c by ")));
+  EXPECT_THAT(Series({3}).Words(), HasSubstr("needs at least 2"));
+  Series displaced({0, 2, 4, 6});
+  displaced.positions[2].x() += 30;
+  displaced.positions[2] -=
+      (displaced.positions[2] - displaced.positions[1]).dot(displaced.normal) * displaced.normal -
+      2 * displaced.normal;
+  EXPECT_THAT(displaced.Words(), AllOf(HasSubstr("1 slices lie off the line"), HasSubstr("c by ")));
 }
 
 }  // namespace
