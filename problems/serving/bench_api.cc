@@ -20,7 +20,6 @@
 #include "problems/serving/bench_json.h"
 #include "problems/workbench/bench_actions.h"
 #include "problems/workbench/bench_assets.h"
-#include "problems/workbench/bench_incoming.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
@@ -68,7 +67,7 @@ Json BodyOf(const BenchRequest& request) {
 }
 
 BenchReply StateReply(const Bench& bench) {
-  return JsonReply(SnapshotJson(bench.Look(), bench.Folder()));
+  return JsonReply(SnapshotJson(bench.TakeSnapshot(), bench.Folder()));
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -128,7 +127,7 @@ BenchReply RunFile(const Bench& bench, const std::string& name) {
 // ---------------------------------------------------------------------------------------------
 
 BenchReply Meshes(Bench& bench, const BenchRequest&) {
-  return JsonReply(MeshesJson(*bench.Look().subject));
+  return JsonReply(MeshesJson(*bench.TakeSnapshot().subject));
 }
 
 BenchReply Sites(Bench&, const BenchRequest&) { return JsonReply(SitesJson()); }
@@ -176,7 +175,7 @@ BenchReply FaceReply(const BenchFace& face) { return JsonReply(FaceJson(face)); 
 
 BenchVariant VariantAsked(const BenchRequest& request) {
   const auto asked = request.query.find("variant");
-  return asked == request.query.end() ? BenchVariant::kAsIs : VariantCalled(asked->second);
+  return asked == request.query.end() ? BenchVariant::kAsIs : FindVariant(asked->second);
 }
 
 BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
@@ -197,7 +196,7 @@ BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
   const auto format = request.query.find("format");
   const std::string name =
       "landmarks" + (format == request.query.end() ? std::string(".yaml") : format->second);
-  const LandmarkFile file = LandmarksOf(Now(bench.Look().history));
+  const LandmarkFile file = ToLandmarkFile(CurrentState(bench.TakeSnapshot().history));
   return {200, "application/octet-stream", EncodeLandmarks(file, name), name};
 }
 
@@ -208,7 +207,7 @@ BenchReply FaceFile(Bench& bench, const BenchRequest& request) {
   const bool is_variant = request.query.contains("variant");
   const BenchFace face = is_variant ? bench.FullVariant(VariantAsked(request)) : bench.Full();
   const std::string name =
-      is_variant ? std::string(NameOf(VariantAsked(request))) : std::string("face");
+      is_variant ? std::string(VariantName(VariantAsked(request))) : std::string("face");
   return {200, "application/octet-stream",
           EncodeFace(face.surface, extension, /*chord_mm=*/std::nullopt, /*threads=*/1),
           name + extension};
@@ -247,47 +246,47 @@ void Place(Bench& bench, const Json& json) {
 }
 void Remove(Bench& bench, const Json& json) {
   const std::string site = TextOf(json, "site");
-  bench.Do("removed " + site, [&](BenchState s) { return RemoveLandmark(std::move(s), site); });
+  bench.Apply("removed " + site, [&](BenchState s) { return RemoveLandmark(std::move(s), site); });
 }
 void Rename(Bench& bench, const Json& json) {
   const std::string site = TextOf(json, "site"), name = TextOf(json, "name");
-  bench.Do(fmt::format("renamed {} to {}", site, name),
+  bench.Apply(fmt::format("renamed {} to {}", site, name),
            [&](BenchState s) { return RenameLandmark(std::move(s), site, name); });
 }
 void Absent(Bench& bench, const Json& json) {
   const std::string site = TextOf(json, "site");
-  bench.Do("called " + site + " absent",
-           [&](BenchState s) { return CallAbsent(std::move(s), site, TextOf(json, "reason")); });
+  bench.Apply("called " + site + " absent",
+           [&](BenchState s) { return MarkAbsent(std::move(s), site, TextOf(json, "reason")); });
 }
 void Remark(Bench& bench, const Json& json) {
   const std::string site = TextOf(json, "site");
-  bench.Do("remarked on " + site,
+  bench.Apply("remarked on " + site,
            [&](BenchState s) { return RemarkLandmark(std::move(s), site, RemarksOf(json)); });
 }
 void Confirm(Bench& bench, const Json& json) {
   const std::string site = TextOf(json, "site");
-  bench.Do("confirmed " + site, [&](BenchState s) { return ConfirmLandmark(std::move(s), site); });
+  bench.Apply("confirmed " + site, [&](BenchState s) { return ConfirmLandmark(std::move(s), site); });
 }
 void ConfirmAll(Bench& bench, const Json&) {
-  bench.Do("confirmed all", [](BenchState s) { return ConfirmAllLandmarks(std::move(s)); });
+  bench.Apply("confirmed all", [](BenchState s) { return ConfirmAllLandmarks(std::move(s)); });
 }
 void ClearLandmarks(Bench& bench, const Json&) {
-  bench.Do("removed all landmarks", [](BenchState s) { return TakeLandmarks(std::move(s), {}); });
+  bench.Apply("removed all landmarks", [](BenchState s) { return ReplaceLandmarks(std::move(s), {}); });
 }
-void Predicted(Bench& bench, const Json&) { bench.TakePredicted(); }
+void Predicted(Bench& bench, const Json&) { bench.AcceptPredicted(); }
 void Set(Bench& bench, const Json& json) {
   const std::string path = TextOf(json, "path");
   if (path == "subject.axes" || path == "subject.units") {
     bench.CorrectFrame(path, json.at("value").dump());
     return;
   }
-  bench.Do("set " + path, [&](BenchState s) {
+  bench.Apply("set " + path, [&](BenchState s) {
     return ChangeSetting(std::move(s), path, json.at("value").dump());
   });
 }
 void Unset(Bench& bench, const Json& json) {
   const std::string path = TextOf(json, "path");
-  bench.Do("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
+  bench.Apply("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
 }
 Pull PullOf(const Json& json) {
   return {.level = json_parts::IntFromJson(json.at("level")),
@@ -300,7 +299,7 @@ void PullFace(Bench& bench, const Json& json) {
   bench.PullAt(VectorOf(json, "at"), pull);
 }
 void ClearEdits(Bench& bench, const Json&) {
-  bench.Do("took all edits back", [](BenchState s) { return TakeEdits(std::move(s), {}); });
+  bench.Apply("took all edits back", [](BenchState s) { return ReplaceEdits(std::move(s), {}); });
 }
 void Keep(Bench& bench, const Json& json) {
   bench.KeepFeature(TextOf(json, "part"), TextOf(json, "name"));
@@ -335,7 +334,7 @@ void Forget(Bench& bench, const Json& json) { DropIncoming(bench.Folder(), TextO
 void MakeVariants(Bench& bench, const Json& json) {
   std::vector<BenchVariant> variants;
   for (const Json& name : json.at("variants")) {
-    variants.push_back(VariantCalled(name.get<std::string>()));
+    variants.push_back(FindVariant(name.get<std::string>()));
   }
   bench.StartVariants(variants);
 }
@@ -395,7 +394,7 @@ BenchReply LookAtPath(Bench& bench, const BenchRequest& request) {
   const std::string batch = TextOr(json, "batch");
   const fs::path path =
       batch.empty() ? fs::path(TextOf(json, "path")) : IncomingBatch(bench.Folder(), batch);
-  return JsonReply(BroughtJson(LookAtBrought(path)));
+  return JsonReply(ImportedFileJson(IdentifyImport(path)));
 }
 
 // How each vertex goes with a pull: for the page to draw it while the pointer moves.

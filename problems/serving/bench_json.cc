@@ -39,7 +39,7 @@ Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
 Json SubjectJson(const Bench::Snapshot& shot) {
   const BenchSubject& subject = *shot.subject;
   const auto& files = std::get<FileSubject>(shot.experiment.subject);
-  Json json = {{"name", Now(shot.history).subject},
+  Json json = {{"name", CurrentState(shot.history).subject},
                {"revision", shot.subject_revision},
                {"skull", files.skull.string()},
                {"skin", files.skin.string()},
@@ -121,7 +121,7 @@ Json SiteJson(const Site& site) {
 }  // namespace
 
 std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::path& folder) {
-  const BenchState& state = Now(shot.history);
+  const BenchState& state = CurrentState(shot.history);
   Json json = {{"revision", shot.revision},
                {"folder", folder.string()},
                {"subject", SubjectJson(shot)},
@@ -142,7 +142,7 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
                  {"revision", shot.face_revision}}},
                {"variants", Json::array()}};
   for (const BenchVariant variant : shot.variants) {
-    json["variants"].push_back(NameOf(variant));
+    json["variants"].push_back(VariantName(variant));
   }
   for (const BenchLandmark& landmark : state.landmarks) {
     json["landmarks"].push_back(LandmarkJson(landmark, shot.checks));
@@ -181,7 +181,7 @@ std::string PullMovesJson(const std::array<std::vector<Vec3>, 3>& moves) {
   return json.dump();
 }
 
-std::string BroughtJson(const Brought& brought) {
+std::string ImportedFileJson(const ImportedFile& brought) {
   Json json = {{"kind", EnumNames(brought.kind).at(static_cast<std::size_t>(brought.kind))},
                {"path", brought.path.string()},
                {"name", brought.path.filename().string()},

@@ -22,7 +22,7 @@ std::string FaceJson(const BenchFace& face);
 std::string PullMovesJson(const std::array<std::vector<Vec3>, 3>& moves);
 
 // {kind, path, name, ways}: what was brought, and as what it can be opened.
-std::string BroughtJson(const Brought& brought);
+std::string ImportedFileJson(const ImportedFile& brought);
 
 // {skull, skin}: blobs, null where there is none.
 std::string MeshesJson(const BenchSubject& subject);
