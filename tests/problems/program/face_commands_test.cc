@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands edit, export and feature as users meet them.
+// The commands edit, export and feature, called as a program.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -37,7 +37,7 @@ class FaceCommands : public ::testing::Test {
     EXPECT_EQ(outcome.err, "") << arguments;
   }
 
-  // One line of error, and exit code 2.
+  // Expects one line of error and exit code 2.
   void ExpectRefused(const std::string& arguments, const std::string& words) {
     const testing::Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
@@ -68,7 +68,7 @@ TEST_F(FaceCommands, EditMovesVerticesAndItsInverseMovesThemBack) {
   ExpectDone("edit face.json script.yaml --out back.json --inverse inverse.yaml --force");
 }
 
-TEST_F(FaceCommands, EditResetsARegionAndItsInverseBringsItBack) {
+TEST_F(FaceCommands, EditResetsARegionAndItsInverseRestoresIt) {
   WriteFileAtomically(folder_ / "reset.yaml", "resets:\n  - {u: [0, 0.5], v: [0, 1]}\n");
   ExpectDone("edit face.json reset.yaml --out smooth.json --inverse inverse.yaml");
   const HSplineSurface smooth = ReadHSpline(folder_ / "smooth.json");
@@ -91,7 +91,7 @@ TEST_F(FaceCommands, ExportsExactAndTriangulatedFaces) {
             ReadMesh(folder_ / "face.obj").triangles.size());
 }
 
-TEST_F(FaceCommands, APlyBearsTheCurvaturesOfTheSurface) {
+TEST_F(FaceCommands, APlyContainsTheCurvaturesOfTheSurface) {
   ExpectDone("export face.json --to coarse.ply --chord_mm 2");
   const auto scalar = [&](const char* name) {
     return PlyVertexScalar(Bytes("coarse.ply"), name, "coarse.ply");
@@ -109,7 +109,7 @@ TEST_F(FaceCommands, APlyBearsTheCurvaturesOfTheSurface) {
   EXPECT_EQ(scalar("quality"), mean);
 }
 
-TEST_F(FaceCommands, ExportsToCadOrSaysWhatIsMissing) {
+TEST_F(FaceCommands, ExportsToCadOrNamesTheMissingPart) {
   if (HasCad()) {
     ExpectDone("export face.json --to face.step");
     EXPECT_THAT(Bytes("face.step"), StartsWith("ISO-10303-21;"));
@@ -140,7 +140,7 @@ TEST_F(FaceCommands, AScaleOfModesIsAboveZeroAndBelowABillion) {
   }
 }
 
-TEST_F(FaceCommands, NothingThatIsReadIsReplaced) {
+TEST_F(FaceCommands, InputFilesAreNotReplaced) {
   const std::string words = ": it is read here, and what is read is never replaced";
   WriteFileAtomically(folder_ / "script.yaml", "edits: []\n");
   ExpectDone("export face.json --to face.ply");
@@ -158,7 +158,7 @@ TEST_F(FaceCommands, NothingThatIsReadIsReplaced) {
   EXPECT_EQ(Bytes("face.json"), before);
 }
 
-TEST_F(FaceCommands, AFeatureGoesFromFaceToFace) {
+TEST_F(FaceCommands, AFeatureIsTransferredBetweenFaces) {
   ExpectDone("feature extract face.json --u 0.2 0.8 --levels 2 3 --name nose --library lib");
   const Feature nose = ReadFeature(folder_ / "lib/nose.json");
   const FeatureRegion region{.lowest_u = 0.2, .highest_u = 0.8, .first_level = 2, .last_level = 3};
