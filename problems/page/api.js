@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Asking the program. Every address lies below the page's own, which carries the token.
+// Requests to the program. Every address lies below the page's address, which contains the token.
 
 async function answerOf(response) {
   const type = response.headers.get('Content-Type') || '';
   const answer = type.startsWith('application/json') ? await response.json() : await response.text();
-  if (!response.ok) { throw new Error(answer.error || answer || `the program answers ${response.status}`); }
+  if (!response.ok) { throw new Error(answer.error || answer || `the program replied with status ${response.status}`); }
   if (answer.refused !== undefined) { throw new Error(answer.refused); }
   return answer;
 }
@@ -13,7 +13,7 @@ async function fetchFrom(address, options) {
   try {
     return await fetch(address, options);
   } catch {
-    throw new Error('The program does not answer; it may have ended. Start it again: nothing is lost.');
+    throw new Error('The program does not answer; it may have ended. Start it again; nothing is lost.');
   }
 }
 
@@ -26,7 +26,7 @@ const addressOf = (path, query) => {
 
 export const get = (path, query = {}) => ask(addressOf(path, query));
 
-// A file that the program makes, and its name.
+// A file made by the program, with its name.
 export const getFile = async (path, query) => {
   const response = await fetchFrom(addressOf(path, query));
   const named = /filename="([^"]*)"/.exec(response.headers.get('Content-Disposition') || '');
@@ -40,7 +40,7 @@ export const getFile = async (path, query) => {
 export const post = (path, body) =>
     ask(`api/${path}`, {method: 'POST', headers: {'Content-Type': 'application/json'}, body: JSON.stringify(body)});
 
-// Several files that belong together are sent under one batch; nothing is opened by it.
+// Uploads one file of a batch. Files that belong together share a batch. Uploading opens nothing.
 export const upload = (file, batch, name) =>
     ask(`api/upload?${new URLSearchParams({batch, name})}`,
         {method: 'POST', headers: {'Content-Type': 'application/octet-stream'}, body: file});

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far one face lies outside another that has the same vertices: along the former one's normals, in mm.
+// Distances in mm between two faces with the same vertices, along the normals of the former face; outwards is positive.
 
 export const changeBetween = (former, now) => {
   const a = former.attributes.position, b = now.attributes.position, normals = former.attributes.normal.array;
@@ -13,7 +13,7 @@ export const changeBetween = (former, now) => {
   return values;
 };
 
-// {most, mean}: of the absolute changes, mm.
+// {most, mean}: maximum and mean of the absolute changes in mm.
 export const sizeOf = (values) => {
   let most = 0, sum = 0;
   for (const value of values) {

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Variants side by side under one camera: builds of a table, or all depths a standard deviation less and more. Coarse at
-// once, in full once they are made.
+// Variants side by side under one camera: builds of a table, or all depths minus and plus a standard deviation. They are
+// coarse at first, and full once they have been made.
 import {get} from './api.js';
 import {sizeOf} from './changes.js';
 import {button, check, element, select} from './dom.js';
-import {act, keep, say, store} from './store.js';
+import {act, download, showMessage, store} from './store.js';
 
-const TITLES = {emaciated: 'Emaciated', normal: 'Normal', obese: 'Obese', thinner: '\u2212 1 SD', as_is: 'As chosen', thicker: '+ 1 SD'};
+const TITLES = {emaciated: 'Emaciated', normal: 'Normal', obese: 'Obese', thinner: '\u2212 1 SD', as_is: 'Present', thicker: '+ 1 SD'};
 const SETS = {
   builds: {text: 'Builds', variants: ['emaciated', 'normal', 'obese'], middle: 'normal'},
   deviations: {text: '\u00b1 1 standard deviation', variants: ['thinner', 'as_is', 'thicker'], middle: 'as_is'},
@@ -14,7 +14,7 @@ const SETS = {
 };
 const FORMATS = ['.ply', '.obj', '.stl', '.glb', '.off', '.step', '.iges', '.vtu'];
 
-// How far a face lies from the middle one.
+// Title and distances from the middle face.
 const caption = (title, values) => {
   if (!values) { return [title]; }
   const {mean, most} = sizeOf(values);
@@ -32,21 +32,21 @@ export function comparePanel({scene}) {
   format.setAttribute('aria-label', 'kind of file');
   const legend = element('div', {className: 'legend-place'}), home = scene.legend.parentElement;
   const root = element('div', {},
-      element('p', {textContent: 'Faces of the same head, side by side under one camera. Colours say how far each lies outside (+) or inside (\u2212) the middle one.'}),
+      element('p', {textContent: 'Faces of the same head, side by side under one camera. Colours show the distance of each face outside (+) or inside (\u2212) the middle one.'}),
       element('div', {className: 'row'}, ...buttons), check('Colour the difference', colour), legend, note, kind, make, status, save,
-      element('small', {className: 'doc', textContent: 'Where a table states no standard deviation, 3 mm is taken, the mean of the T-Table 2023. A pooled table has one build. The full faces lie in variants/; semblance run FOLDER/config.yaml --set tissue.build=obese makes the same.'}));
+      element('small', {className: 'doc', textContent: 'If a table states no standard deviation, 3 mm is used, the mean of the T-Table 2023. A pooled table has only one build. The full faces are stored in variants/; semblance run FOLDER/config.yaml --set tissue.build=obese makes the same face.'}));
 
   const missing = () => SETS[chosen].variants.filter((name) => !store.state.variants.includes(name));
 
   const drawFull = () => {
     const left = missing(), running = store.state.job.state === 'running' && store.state.job.name === 'variants';
-    kind.textContent = left.length ? 'Coarse faces, from the depths alone.' : 'Full faces.';
+    kind.textContent = left.length ? 'Coarse faces, made from the depths alone.' : 'Full faces.';
     kind.dataset.kind = left.length ? 'coarse' : 'full';
-    make.replaceChildren(left.length && !running ? button(`Make ${left.length === SETS[chosen].variants.length ? 'them' : `the other ${left.length}`} in full`,
+    make.replaceChildren(left.length && !running ? button(`Make ${left.length === SETS[chosen].variants.length ? 'the' : `the other ${left.length}`} full faces`,
         () => act('variants', {variants: left}), {className: 'primary', dataset: {make: 'variants'}}) : '');
     const made = SETS[chosen].variants.filter((name) => store.state.variants.includes(name));
     save.replaceChildren(made.length ? element('div', {className: 'row'}, 'Save', format, ...made.map((name) => button(TITLES[name], () =>
-        keep('export', {variant: name, format: format.value})))) : '');
+        download('export', {variant: name, format: format.value})))) : '');
   };
 
   const show = (faces) => {
@@ -58,7 +58,7 @@ export function comparePanel({scene}) {
 
   const draw = async () => {
     const {tissue} = store.state.values, {variants} = SETS[chosen];
-    note.textContent = tissue.depths === 'measured' && chosen !== 'deviations' ? 'The depths of this head are measured: builds of a table change nothing.' : '';
+    note.textContent = tissue.depths === 'measured' && chosen !== 'deviations' ? 'The depths of this head are measured; the build of a table does not change them.' : '';
     const turn = ++asked;
     status.textContent = 'Working \u2026';
     for (const made of buttons) { made.setAttribute('aria-pressed', String(made.dataset.set === chosen)); }
@@ -71,13 +71,13 @@ export function comparePanel({scene}) {
       if (turn !== asked || !shown) { return; }
       show(faces);
       status.textContent = '';
-      say('');
+      showMessage('');
     } catch (error) {
       status.textContent = '';
-      if (turn === asked && shown) { say(error.message); }
+      if (turn === asked && shown) { showMessage(error.message); }
     }
   };
-  // What the pictures depend on.
+  // Key of all that the pictures depend on.
   const keyOf = (state) => JSON.stringify([state.revision, chosen, SETS[chosen].variants.filter((name) => !state.variants.includes(name)).length > 0]);
   return {
     element: root,

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A control for any option, made from the JSON Schema of the program's own options: name, range, unit, meaning. A new
-// option of the program appears here by itself.
+// A control for any option, made from the JSON Schema of the program's options: name, range, unit, meaning. A new option
+// of the program therefore appears in the page without a change here.
 import {element, field, select} from './dom.js';
 import {act, store} from './store.js';
 
-// What an entry of the schema is: {kind, ...}.
+// The kind of an entry of the schema: {kind, ...}.
 export function kindOf(schema) {
   if (schema.enum) { return {kind: 'word', words: schema.enum}; }
   if (schema.anyOf) {
@@ -20,7 +20,7 @@ export function kindOf(schema) {
   return {kind: 'other'};
 }
 
-// The meaning and the unit apart: "what it means [mm]".
+// Splits a description "meaning [mm]" into meaning and unit.
 export function documentation(schema) {
   const text = schema.description || '', found = /\s*\[([^\]]*)\]$/.exec(text);
   return {doc: found ? text.slice(0, found.index) : text, unit: found ? found[1] : ''};
@@ -56,7 +56,7 @@ function textControl(path, value, send) {
   return select(known, value, send);
 }
 
-// The control of one value; null where a text in JSON has to serve.
+// The control of one value, or null if the value must be edited as JSON text.
 function simpleControl(path, schema, value, send) {
   const {kind, inner, words} = kindOf(schema);
   if (kind === 'word') { return select(words.map((word) => [word, word]), value, send); }
@@ -81,7 +81,7 @@ function jsonControl(value, send) {
       made.setCustomValidity('');
       send(JSON.parse(made.value));
     } catch (error) {
-      made.setCustomValidity(`This is no JSON: ${error.message}`);
+      made.setCustomValidity(`This is not valid JSON: ${error.message}`);
       made.reportValidity();
     }
   });
@@ -91,13 +91,13 @@ function jsonControl(value, send) {
 const isSet = (path) => store.state.settings.some((setting) => setting.path === path || setting.path.startsWith(`${path}.`));
 
 function resetButton(path) {
-  const made = element('button', {type: 'button', className: 'reset', textContent: '\u21ba', title: `${path}: as it was at the beginning`});
+  const made = element('button', {type: 'button', className: 'reset', textContent: '\u21ba', title: `${path}: back to its value at the beginning`});
   made.setAttribute('aria-label', `reset ${path}`);
   made.addEventListener('click', (event) => { event.preventDefault(); act('unset', {path}); });
   return made;
 }
 
-// One option with its name, unit, range and meaning.
+// A row for one option: name, unit, control, with range and meaning as a tooltip.
 export function control(path, schema, value, name = path.split('.').pop()) {
   const send = (next) => act('set', {path, value: next});
   const {doc, unit} = documentation(schema), range = rangeWords(kindOf(schema).inner || schema);
@@ -109,7 +109,7 @@ export function control(path, schema, value, name = path.split('.').pop()) {
   return row;
 }
 
-// An option with all that lies below it, folded.
+// A folded row for an option and all options below it.
 export function tree(path, schema, value, matches = () => true, open = false) {
   const kind = kindOf(schema), name = path.split('.').pop();
   if (kind.kind !== 'struct' && kind.kind !== 'variant') {
@@ -142,7 +142,7 @@ export function typeControl(path, kind, value, name) {
   return row;
 }
 
-// The schema and the value at a path, through variants as they are chosen.
+// The schema and the value at a path. Variants are followed as they are chosen at present.
 export function at(path) {
   let schema = store.schema, value = store.state.values;
   for (const key of path.split('.')) {
@@ -154,7 +154,7 @@ export function at(path) {
   return {schema, value};
 }
 
-// A control for whatever stands at the path; null where the present choices have no such option.
+// A control for the option at the path, or null if the present options have no such option.
 export function controlAt(path, name) {
   const found = at(path);
   if (!found) { return null; }

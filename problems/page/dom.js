@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Elements without markup: text stays text, whatever a file has put into it.
+// Makes elements without parsing markup, so that text from a file is always shown as text.
 
 export const element = (tag, properties = {}, ...children) => {
   const made = document.createElement(tag);

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The choices that lead to a face: the few that matter most, single depths, and all the others.
+// The options that lead to a face: the few that matter most, single depths, and all others.
 import {controlAt, tree} from './controls.js';
 import {button, check, element, field, group, lines} from './dom.js';
-import {act, keep, nameOf, store} from './store.js';
+import {act, download, nameOf, store} from './store.js';
 
-const MAIN = [['tissue.depths', 'depths from'], ['tissue.table', 'table'], ['tissue.fill_from', 'else from'],
-              ['tissue.sex', 'sex'], ['tissue.build', 'build'], ['template', 'generic face'], ['face', 'way to the face'],
-              ['interp', 'between the dowels']];
+const MAIN = [['tissue.depths', 'depths from'], ['tissue.table', 'table'], ['tissue.fill_from', 'missing depths from'],
+              ['tissue.sex', 'sex'], ['tissue.build', 'build'], ['template', 'template'], ['face', 'method'],
+              ['interp', 'interpolation']];
 const FORMATS = ['.ply', '.obj', '.stl', '.glb', '.off', '.step', '.iges', '.vtu'];
 const HIDDEN = ['subject', 'title', 'edits', 'base'];
 
 function stateLine(faces) {
   const {kind, words, seconds, change, coloured} = faces;
-  if (kind === 'none') { return element('p', {className: 'bad', textContent: words || 'There is no face yet.'}); }
-  const what = kind === 'full' ? 'The full face.' : `A coarse face, made in ${seconds.toFixed(2)} s: the full one follows the bone and the fit.`;
-  const moved = coloured && change ? ` Changed by ${change.mean.toFixed(2)} mm in the mean, ${change.most.toFixed(1)} mm at most.` : '';
+  if (kind === 'none') { return element('p', {className: 'bad', textContent: words || 'No face yet.'}); }
+  const what = kind === 'full' ? 'Full face.' : `Coarse face, made in ${seconds.toFixed(2)} s from the depths alone. The full face also uses the bone and the fit.`;
+  const moved = coloured && change ? ` Change: mean ${change.mean.toFixed(2)} mm, at most ${change.most.toFixed(1)} mm.` : '';
   return element('p', {className: 'face-state', textContent: what + moved, dataset: {kind}});
 }
 
-// A depth of a site as a slider: while it is dragged the face follows, when it is let go the choice is kept.
+// A slider for the depth of a site. The face follows while it is dragged; the depth is stored when it is released.
 function depthRow(dowel, faces) {
   const path = `tissue.set_mm.${dowel.site}`, isSet = store.state.settings.some((setting) => setting.path === path);
   const shown = element('output', {textContent: `${dowel.depth_mm.toFixed(1)}`});
@@ -32,7 +32,7 @@ function depthRow(dowel, faces) {
   const sd = dowel.sd_mm === null ? '' : `, standard deviation ${dowel.sd_mm.toFixed(1)} mm`;
   return element('div', {className: `depth${isSet ? ' set' : ''}`, title: `${nameOf(dowel.site)}${sd}`, dataset: {site: dowel.site}},
       element('span', {textContent: nameOf(dowel.site)}), slider, shown,
-      isSet ? button('\u21ba', () => act('unset', {path}), {className: 'reset', title: 'as the table or the measurement has it'}) : element('i'));
+      isSet ? button('\u21ba', () => act('unset', {path}), {className: 'reset', title: 'back to the depth of the table or the measurement'}) : element('i'));
 }
 
 export function facePanel({faces, scene}) {
@@ -45,10 +45,10 @@ export function facePanel({faces, scene}) {
   search.setAttribute('aria-label', 'find an option');
   const format = element('select', {}, ...FORMATS.map((ending) => element('option', {value: ending, textContent: ending})));
   format.setAttribute('aria-label', 'kind of file');
-  const save = element('div', {className: 'row'}, 'The full face as a file', format, button('Save', () => keep('export', {format: format.value})));
+  const save = element('div', {className: 'row'}, 'Save the full face as', format, button('Save', () => download('export', {format: format.value})));
   const root = element('div', {}, line,
-      group('Show', check('Colour what the last change did', colour), check('Keep comparing with the face of now', pin), field('solid face', clear)),
-      group('Choices', main), element('details', {open: true}, element('summary', {textContent: 'Depths, mm'}), depths),
+      group('Show', check('Colour the last change', colour), check('Compare with the present face from now on', pin), field('opacity of the face', clear)),
+      group('Main options', main), element('details', {open: true}, element('summary', {textContent: 'Depths, mm'}), depths),
       element('details', {}, element('summary', {textContent: 'All options'}), search, all), notes, save);
 
   const drawDepths = () => {

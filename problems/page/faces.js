@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which face is on show: the coarse one at once after each change, the run's where it is of the present choices; and
-// what the last change did to it.
+// The face that is shown: the full face of the run if it belongs to the present state, otherwise a coarse one; and the
+// change of the face by the last action.
 import {get} from './api.js';
 import {sizeOf} from './changes.js';
 
@@ -8,37 +8,37 @@ export class Faces {
   constructor(scene) {
     this.scene = scene;
     this.kind = 'none';      // none, coarse, full
-    this.words = '';         // why there is none
+    this.words = '';         // reason if there is no face
     this.notes = [];
     this.dowels = [];
-    this.settled = null;     // the geometry of the last state; what is only tried out is none
-    this.former = null;      // the geometry that changes are told from
-    this.pinned = false;     // it stays the one that was pinned
+    this.kept = null;        // the geometry of the last state; trials do not change it
+    this.former = null;      // the geometry that changes are measured from
+    this.pinned = false;     // `former` stays the same
     this.coloured = false;
     this.change = null;
     this.listeners = [];
-    this.busy = false;       // a face is on its way
+    this.busy = false;       // a request is running
   }
 
   onChange(listener) { this.listeners.push(listener); }
 
-  // A new state: the face follows, if anything that it depends on may have changed.
+  // Loads the face of a new state, unless the state has not changed.
   async state(state, former) {
     const same = former && former.revision === state.revision;
     if (same) { return; }
     if (state.landmarks.length < 3) {
-      this.clear('A face needs three landmarks at least, better all of them.');
+      this.clear('A face needs at least three landmarks, better all of them.');
       return;
     }
     await this.load(() => get(state.face.fresh ? 'face' : 'coarse'), state.face.fresh ? 'full' : 'coarse');
   }
 
-  // A depth that is being dragged: seen, not yet kept.
+  // Shows the face for an option value that is not stored, for example a depth while it is dragged.
   async tryOut(path, value) {
     await this.load(() => get('coarse', {path, value: JSON.stringify(value)}), 'coarse', true);
   }
 
-  // Only the latest answer counts; while one is under way, the latest question waits.
+  // Only the latest request counts. While one runs, the latest one waits and the others are dropped.
   async load(ask, kind, trial = false) {
     this.next = {ask, kind, trial};
     if (this.busy) { return; }
@@ -47,7 +47,7 @@ export class Faces {
       const {ask: now, kind: what, trial: tried} = this.next;
       this.next = null;
       try {
-        this.take(await now(), what, tried);
+        this.show(await now(), what, tried);
       } catch (error) {
         this.clear(error.message);
       }
@@ -55,8 +55,8 @@ export class Faces {
     this.busy = false;
   }
 
-  take(face, kind, trial) {
-    if (!this.pinned) { this.former = this.settled; }
+  show(face, kind, trial) {
+    if (!this.pinned) { this.former = this.kept; }
     this.kind = kind;
     this.words = '';
     this.notes = face.notes;
@@ -65,10 +65,10 @@ export class Faces {
     this.finest = face.finest_level;
     this.blob = face.mesh;
     this.scene.put('face', face.mesh);
-    if (!trial) { this.settled = this.scene.faceGeometry().clone(); }
+    if (!trial) { this.kept = this.scene.faceGeometry().clone(); }
     this.scene.putDowels(this.dowels);
     this.recolour();
-    this.tell();
+    this.notify();
   }
 
   clear(words) {
@@ -77,7 +77,7 @@ export class Faces {
     this.notes = [];
     this.scene.put('face', null);
     this.scene.putDowels([]);
-    this.tell();
+    this.notify();
   }
 
   recolour() {
@@ -88,7 +88,7 @@ export class Faces {
   colour(on) {
     this.coloured = on;
     this.recolour();
-    this.tell();
+    this.notify();
   }
 
   pin(on) {
@@ -96,8 +96,8 @@ export class Faces {
     const now = this.scene.faceGeometry();
     if (on && now) { this.former = now.clone(); }
     this.recolour();
-    this.tell();
+    this.notify();
   }
 
-  tell() { for (const listener of this.listeners) { listener(this); } }
+  notify() { for (const listener of this.listeners) { listener(this); } }
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Work in the background: how far it is, and a way to stop it.
+// The background job: its progress, and a button to stop it.
 import {button, element} from './dom.js';
-import {act, refresh, say, store} from './store.js';
+import {act, refresh, showMessage, store} from './store.js';
 
 const NAMES = {run: 'Full face', propose: 'Proposal', open: 'Opening', variants: 'Variants'};
 const EVERY_MS = 400;
@@ -18,11 +18,11 @@ export class Job {
     const {job, face} = state, runs = job.state === 'running';
     this.runButton.hidden = runs && job.name === 'run';
     this.runButton.disabled = runs || face.saved || state.landmarks.length === 0;
-    this.runButton.textContent = face.saved ? 'Full face is made' : 'Make the full face';
+    this.runButton.textContent = face.saved ? 'The full face is made' : 'Make the full face';
     this.runButton.classList.toggle('primary', !face.saved);
     this.show(job, face);
     if (runs && !this.timer) {
-      this.timer = setInterval(() => refresh().catch((error) => { this.stop(); say(error.message); }), EVERY_MS);
+      this.timer = setInterval(() => refresh().catch((error) => { this.stop(); showMessage(error.message); }), EVERY_MS);
     }
     if (!runs) { this.stop(); }
   }
@@ -39,7 +39,7 @@ export class Job {
       if (job.fraction !== null) { bar.value = job.fraction; }
       parts.push(element('span', {textContent: `${NAMES[job.name]}: ${job.step}, ${Math.round(job.seconds)} s`}), bar,
                  button('Stop', () => act('cancel')));
-    } else if (job.state === 'failed' && job.name !== 'open') {  // that is told where it was opened
+    } else if (job.state === 'failed' && job.name !== 'open') {  // the opener shows that
       parts.push(element('span', {className: 'bad', textContent: `${NAMES[job.name]}: ${job.words}`}));
     } else if (job.state === 'stopped' && !face.saved && job.name !== 'open') {
       parts.push(element('span', {textContent: `${NAMES[job.name]}: stopped`}));

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Landmarks: a list of the sites, what the chosen one is, and clicks on the bone.
+// Landmarks: a list of the sites, details of the chosen site, and clicks on the bone.
 import {button, element, field, lines, millimetres, select} from './dom.js';
 import {chooser} from './opener.js';
-import {act, choose, keep, landmarkOf, nameOf, onChoice, siteOf, store} from './store.js';
+import {act, choose, download, landmarkOf, nameOf, onChoice, siteOf, store} from './store.js';
 
 const FORMATS = [['.yaml', 'YAML (Semblance)'], ['.mrk.json', '3D Slicer (.mrk.json)'], ['.fcsv', '3D Slicer (.fcsv)'],
                  ['.pp', 'MeshLab (.pp)'], ['.csv', 'table (.csv)'], ['.txt', 'CloudCompare (.txt)']];
 const DOUBTFUL = {from_bone_mm: 2, from_mirror_mm: 8, from_predicted_mm: 15};
 const MEANINGS = {from_bone_mm: 'from the bone', from_mirror_mm: 'from the mirror image of its partner',
-                  from_predicted_mm: 'from where the others predict it'};
+                  from_predicted_mm: 'from the prediction by the others'};
 
 const standardSites = () => store.sites.filter((site) => site.standard);
 const isAbsent = (code) => store.state.absent.some((absent) => absent.site === code);
@@ -25,7 +25,7 @@ const doubts = (landmark) =>
 function row(site) {
   const landmark = landmarkOf(site.site), absent = isAbsent(site.site);
   const mark = landmark ? (landmark.proposed ? '\u25cc' : '\u25cf') : absent ? '\u2013' : '\u25cb';
-  const words = landmark ? (landmark.proposed ? 'proposed: look at it' : doubts(landmark).length ? 'look again' : '')
+  const words = landmark ? (landmark.proposed ? 'proposed: check it' : doubts(landmark).length ? 'check again' : '')
                          : absent ? 'absent' : '';
   const made = button('', () => choose(site.site), {className: 'site', dataset: {site: site.site}});
   made.setAttribute('aria-pressed', String(store.site === site.site));
@@ -35,44 +35,44 @@ function row(site) {
   return made;
 }
 
-let remarksOpen = false;  // while one goes from site to site
+let remarksOpen = false;  // stays the same for the next site
 
 function remarks(landmark) {
   const change = (what) => act('remark', {site: landmark.site, certainty: landmark.certainty, note: landmark.note,
                                           depth_mm: landmark.depth_along_normal_mm, ...what});
   return element('details', {open: remarksOpen, ontoggle: (event) => { remarksOpen = event.target.open; }},
-      element('summary', {textContent: 'What is known of it'}),
+      element('summary', {textContent: 'Remarks'}),
       field('certainty', select([['high', 'high'], ['medium', 'medium'], ['low', 'low']], landmark.certainty,
                                 (certainty) => change({certainty}))),
       field('depth measured here (mm)', element('input', {type: 'number', min: 0.01, max: 100, step: 0.1,
           value: landmark.depth_along_normal_mm ?? '',
           onchange: (event) => change({depth_mm: event.target.value === '' ? null : Number(event.target.value)})}),
-          'used where the depths are "measured"'),
+          'used if "depths from" is "measured"'),
       field('note', element('input', {type: 'text', maxLength: 300, value: landmark.note,
                                       onchange: (event) => change({note: event.target.value})})));
 }
 
-// Made once per site, so that a change of something else does not make it flicker.
+// One image per site, kept so that other changes do not make it flicker.
 const pictures = new Map();
 const pictureOf = (code) => {
   if (!pictures.has(code)) {
     pictures.set(code, element('img', {src: `api/site.png?${new URLSearchParams({site: code})}`, width: 440, height: 260,
-                                       alt: `where ${nameOf(code)} lies, on a made-up skull from the front and from the side`,
-                                       title: 'a made-up skull; a ring lies behind the bone'}));
+                                       alt: `position of ${nameOf(code)} on a phantom skull, from the front and from the side`,
+                                       title: 'a phantom skull; a ring marks a point behind the bone'}));
   }
   return pictures.get(code);
 };
 
-// Its picture is made when it is opened first.
+// The picture is loaded when the details are opened for the first time.
 const allSites = element('details', {ontoggle: () => {
   if (allSites.open && allSites.children.length === 1) {
-    allSites.append(element('img', {src: 'api/sites.svg', alt: 'the sites on a made-up skull, by number'}));
+    allSites.append(element('img', {src: 'api/sites.svg', alt: 'the sites on a phantom skull, by number'}));
   }
-}}, element('summary', {textContent: 'All sites by their numbers'}));
+}}, element('summary', {textContent: 'All sites by number'}));
 
 function detail(code) {
   if (!code) {
-    return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. A ball that is there is chosen by a click on it.'})];
+    return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. Click on a ball to choose its site.'})];
   }
   const site = siteOf(code), landmark = landmarkOf(code);
   const checks = landmark ? Object.keys(MEANINGS).filter((check) => landmark[check] !== null && landmark[check] !== undefined)
@@ -84,13 +84,13 @@ function detail(code) {
     element('div', {className: 'site-place'}, element('p', {textContent: `${site.definition}.`}), pictureOf(code)),
     checks.length ? element('ul', {className: 'checks'}, ...checks) : null,
     element('div', {className: 'row'},
-        landmark && landmark.proposed ? button('It is right', () => act('confirm', {site: code}), {className: 'primary'}) : null,
+        landmark && landmark.proposed ? button('Confirm', () => act('confirm', {site: code}), {className: 'primary'}) : null,
         landmark ? button('Remove', () => act('remove', {site: code})) : null,
-        isAbsent(code) ? null : button('It is not there', () => act('absent', {site: code, reason: 'the bone is not there'})),
+        isAbsent(code) ? null : button('Mark absent', () => act('absent', {site: code, reason: 'the bone is missing'})),
         button('Next open site', () => choose(nextOpen(code)), {title: 'N'})),
-    landmark ? field('it is another site', select(names, code, async (name) => {
+    landmark ? field('rename to', select(names, code, async (name) => {
       if (await act('rename', {site: code, name})) { choose(name); }
-    })) : element('p', {className: 'hint', textContent: 'Click on the bone where it lies.'}),
+    })) : element('p', {className: 'hint', textContent: 'Click on the bone at this site.'}),
     landmark ? remarks(landmark) : null,
     allSites
   ].filter((part) => part);
@@ -103,7 +103,7 @@ export function landmarkPanel(bench) {
   format.setAttribute('aria-label', 'kind of file');
   const files = element('details', {}, element('summary', {textContent: 'Load and save landmarks'}),
       chooser(bench.opener, 'Landmarks', '.yaml,.yml,.json,.fcsv,.pp,.csv,.txt,.asc'),
-      element('div', {className: 'row'}, format, button('Save as', () => keep('landmarks', {format: format.value}))),
+      element('div', {className: 'row'}, format, button('Save as', () => download('landmarks', {format: format.value}))),
       button('Remove all', () => act('clear_landmarks')));
   const root = element('div', {}, head, about, list, files);
 
@@ -124,15 +124,15 @@ export function landmarkPanel(bench) {
         element('p', {textContent: `${placed.length} of ${standardSites().length} sites are placed${proposed ? `, ${proposed} of them proposed` : ''}.`}),
         element('div', {className: 'row'},
             state.predicted.length ? button(`Suggest the other ${state.predicted.length}`, () => act('take_predicted'),
-                                           {title: 'from those that are placed and an average skull'}) : null,
-            button('Propose by shape', () => act('propose'), {title: 'looks for all sites on the bone; takes a minute'}),
-            proposed ? button('All are right', () => act('confirm_all')) : null),
+                                           {title: 'predicted from the placed sites and an average skull'}) : null,
+            button('Propose by shape', () => act('propose'), {title: 'searches all sites on the bone; takes a minute'}),
+            proposed ? button('Confirm all', () => act('confirm_all')) : null),
         lines(state.errors, 'bad') || '', lines(state.notes, 'soft') || '');
     about.replaceChildren(...detail(store.site));
     const further = store.sites.filter((site) => !site.standard);
     list.replaceChildren(...standardSites().map(row),
         element('details', {open: further.some((site) => landmarkOf(site.site))},
-                element('summary', {textContent: 'Further sites of other tables'}), ...further.map(row)));
+                element('summary', {textContent: 'Sites of other tables'}), ...further.map(row)));
     marks();
   };
 

@@ -12,14 +12,14 @@ import {sculptPanel} from './sculpt_panel.js';
 import {skullPanel} from './skull_panel.js';
 import {Opener, takeDrops} from './opener.js';
 import {Scene} from './scene.js';
-import {act, begin, choose, onState, say, store} from './store.js';
+import {act, begin, choose, onState, showMessage, store} from './store.js';
 
 const TABS = [['skull', 'Skull', skullPanel], ['landmarks', 'Landmarks', landmarkPanel], ['face', 'Face', facePanel],
               ['sculpt', 'Sculpt', sculptPanel], ['compare', 'Compare', comparePanel], ['measure', 'View', measurePanel]];
 
 const byId = (id) => document.getElementById(id);
 
-// Each panel is {element, show(), hide(), state(state, former)}; the last three may be missing.
+// Each panel is {element, show(), hide(), state(state, former)}. The three functions are optional.
 function makeTabs(bench) {
   const panels = new Map();
   let shown = null;
@@ -31,7 +31,7 @@ function makeTabs(bench) {
     const panel = panels.get(name);
     byId('panel').replaceChildren(panel.element);
     byId('panel').scrollTop = 0;
-    say('');
+    showMessage('');
     if (panel.show) { panel.show(); }
     if (panel.state && store.state) { panel.state(store.state, null); }
   };
@@ -53,8 +53,8 @@ function showHeader(state) {
   byId('undo').disabled = !undo;
   byId('redo').disabled = !redo;
   byId('undo').title = undo ? `undo: ${undo} (Ctrl+Z)` : 'nothing to undo';
-  byId('redo').title = redo ? `do again: ${redo} (Ctrl+Shift+Z)` : 'nothing to do again';
-  byId('saved').replaceChildren('All is saved in ', element('code', {textContent: state.folder}), ' \u00b7 the same from the terminal: ',
+  byId('redo').title = redo ? `redo: ${redo} (Ctrl+Shift+Z)` : 'nothing to redo';
+  byId('saved').replaceChildren('All work is saved in ', element('code', {textContent: state.folder}), ' \u00b7 the same face from the terminal: ',
       element('code', {textContent: `semblance run ${state.folder}/config.yaml`}));
 }
 
@@ -75,13 +75,13 @@ function takeKeys(show) {
 async function main() {
   if (!SemblanceGuides.canShow()) {
     byId('view').replaceChildren(element('p', {className: 'empty',
-      textContent: 'This browser shows no 3-D pictures: WebGL is off in it, or this machine has none. The workbench needs it.'}));
+      textContent: 'This browser shows no 3-D pictures: its WebGL is off, or this machine has none. The workbench needs WebGL.'}));
     return;
   }
   const scene = new Scene(byId('view'));
   const bench = {scene, faces: new Faces(scene), store, opener: new Opener(byId('opening'))};
   scene.pace.isBusy = () => bench.faces.busy;
-  window.semblance = bench;  // for a look from the console, and for tests
+  window.semblance = bench;  // for the browser's console and for tests
   const job = new Job(byId('job'), byId('run'));
   const show = makeTabs(bench);
   bench.show = show;
@@ -99,11 +99,11 @@ async function main() {
 
 async function showMeshes(scene, state, former) {
   if (former && former.subject.revision === state.subject.revision) { return; }
-  scene.put('face', null);  // it was another head's
+  scene.put('face', null);  // it belongs to another head
   const {skull, skin} = await get('meshes');
   scene.put('skull', skull);
   scene.put('skin', skin);
   document.body.classList.toggle('empty-bench', !skull);
 }
 
-main().catch((error) => say(error.message));
+main().catch((error) => showMessage(error.message));

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Looking and measuring: what is shown, from where, and the measuring of the report's view.
+// Visible layers, view directions, and the measuring tools of the report's view.
 import {button, element, group} from './dom.js';
 
 const VIEWS = [['Front', 0, 0], ['Three-quarter', 35, 8], ['Left', 90, 0], ['Right', -90, 0], ['Back', 180, 0], ['Top', 0, 89]];
-const NAMES = {skull: 'skull', skin: 'true skin', dowels: 'dowels', face: 'face'};
+const NAMES = {skull: 'skull', skin: 'true skin', dowels: 'depth markers', face: 'face'};
 
 export function measurePanel({scene}) {
   const layers = element('div'), tools = element('div');
@@ -12,7 +12,7 @@ export function measurePanel({scene}) {
     const box = element('input', {type: 'checkbox', checked: state.shown, onchange: () => { state.shown = box.checked; scene.update(); }});
     const slider = element('input', {type: 'range', min: 0.1, max: 1, step: 0.05, value: state.opacity,
                                      oninput: () => { state.opacity = Number(slider.value); scene.update(); }});
-    slider.setAttribute('aria-label', `how solid the ${NAMES[id]} is`);
+    slider.setAttribute('aria-label', `opacity of the ${NAMES[id]}`);
     return element('div', {className: 'layer'}, element('label', {}, box, NAMES[id]), id === 'dowels' ? '' : slider);
   };
   const root = element('div', {},

@@ -1,22 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Bringing a file to the workbench: chosen, dropped, or by its path on this machine. What it is the program says; what
-// would take the place of something is asked of the person first.
+// Opens a file in the workbench: chosen, dropped, or by its path on this machine. The program identifies its kind. The
+// person confirms first if the file would replace something.
 import {post, upload} from './api.js';
 import {documentation, kindOf} from './controls.js';
 import {button, element, field, select} from './dom.js';
-import {act, onState, say, store} from './store.js';
+import {act, onState, showMessage, store} from './store.js';
 
-const MOST_BYTES = 512 * 2 ** 20;  // that the program takes of a file from the browser
+const MAX_BYTES = 512 * 2 ** 20;  // the program's limit of a file from the browser
 const SKIPPED = /(^|\/)(\.[^/]*|Thumbs\.db|desktop\.ini)$/i;
 const KINDS = {mesh: 'a mesh', volume: 'a CT or MR', config: 'a configuration', landmarks: 'landmarks'};
 const WAYS = {
-  mesh: {head: 'Another head: this is its skull', skull: 'Skull of this head; its landmarks stay', skin: 'Skin of this head'},
-  volume: {head: 'Another head: skull and skin from it', skin: 'Skin of this head'},
-  config: {head: 'Its head and its options', options: 'Its options alone, for this head'},
-  landmarks: {landmarks: 'Take these landmarks'},
+  mesh: {head: 'Skull of another head', skull: 'Skull of this head; its landmarks stay', skin: 'Skin of this head'},
+  volume: {head: 'Skull and skin of another head', skin: 'Skin of this head'},
+  config: {head: 'Head and options', options: 'Options alone, for this head'},
+  landmarks: {landmarks: 'Use these landmarks'},
 };
 
-// A name that is one on every machine: no control characters, no dot in front, not too long.
+// Makes a name valid on every machine: no control characters, no dot in front, not too long.
 const safePart = (part) => {
   const clean = part.replace(/[\u0000-\u001f\u007f\\]/g, '_').replace(/^\.+/, '_');
   const end = /\.[A-Za-z0-9]{1,5}(\.gz)?$/.exec(clean)?.[0] || '';
@@ -26,7 +26,7 @@ const safePart = (part) => {
 };
 const safeName = (name) => name.split('/').filter((part) => part).map(safePart).join('/');
 
-// The files of a drop, those in folders too: [{file, name}]. Has to be called before the event ends.
+// The files of a drop, including those in folders: [{file, name}]. Must be called before the event ends.
 export const filesOfDrop = (transfer) => {
   const entries = [...transfer.items].map((item) => item.webkitGetAsEntry && item.webkitGetAsEntry()).filter((entry) => entry);
   const read = async (entry) => {
@@ -34,7 +34,7 @@ export const filesOfDrop = (transfer) => {
       return new Promise((take, fail) => entry.file((file) => take([{file, name: entry.fullPath}]), fail));
     }
     const reader = entry.createReader(), found = [];
-    for (;;) {  // a reader gives a hundred at a time
+    for (;;) {  // a reader returns at most a hundred entries at a time
       const some = await new Promise((take, fail) => reader.readEntries(take, fail));
       if (!some.length) { return found; }
       for (const inner of some) { found.push(...await read(inner)); }
@@ -49,22 +49,22 @@ const words = (text) => text.replaceAll(`${store.state ? store.state.folder : ''
 export class Opener {
   constructor(root) {
     this.root = root;
-    this.brought = null;   // what lies ready: {kind, path, name, ways}
-    this.batch = null;     // of what was sent
-    this.waits = false;    // for the program to have opened it
-    this.volume = {};      // how a volume is read, where the person has said so
+    this.imported = null;  // the identified file: {kind, path, name, ways}
+    this.batch = null;     // of the uploaded files
+    this.waits = false;    // true while the program opens the file
+    this.volume = {};      // options for reading a volume that the person has changed
     onState((state) => this.state(state));
   }
 
   async files(list) {
     const files = list.filter(({name}) => !SKIPPED.test(name));
-    if (!files.length) { say('There is no file in it.'); return; }
-    const large = files.find(({file}) => file.size > MOST_BYTES);
+    if (!files.length) { showMessage('The folder holds no file.'); return; }
+    const large = files.find(({file}) => file.size > MAX_BYTES);
     if (large) {
-      say(`${large.name}: ${Math.round(large.file.size / 2 ** 20)} MB; a browser sends 512 MB at most. Give its path on this machine instead.`);
+      showMessage(`${large.name}: ${Math.round(large.file.size / 2 ** 20)} MB; at most 512 MB can be uploaded. Enter its path on this machine instead.`);
       return;
     }
-    await this.look(async () => {
+    await this.identify(async () => {
       const batch = Array.from(crypto.getRandomValues(new Uint8Array(12)), (n) => (n % 36).toString(36)).join('');
       this.batch = batch;
       this.count = files.length;
@@ -77,32 +77,32 @@ export class Opener {
   }
 
   async path(path) {
-    if (path) { await this.look(async () => ({path})); }
+    if (path) { await this.identify(async () => ({path})); }
   }
 
-  // One thing at a time: what was brought before is forgotten.
-  async look(bring) {
+  // Identifies a file. An earlier file that was not opened is dropped.
+  async identify(bring) {
     await this.forget();
     this.volume = {};
-    say('');
+    showMessage('');
     try {
-      this.brought = await post('look', await bring());
-      if (this.brought.name === this.batch) { this.brought.name = `${this.count} files`; }  // slices, sent by themselves
+      this.imported = await post('look', await bring());
+      if (this.imported.name === this.batch) { this.imported.name = `${this.count} files`; }  // slices without a folder
     } catch (error) {
       await this.forget();
-      say(words(error.message));
+      showMessage(words(error.message));
       return;
     }
-    const {triangles} = store.state.subject, [usual] = this.brought.ways;
+    const {triangles} = store.state.subject, [usual] = this.imported.ways;
     const replaces = usual === 'landmarks' ? store.state.landmarks.length : triangles;
     if (replaces) { this.draw(); } else { this.open(usual); }
   }
 
   async open(as) {
     const axes = this.axes ? this.axes.value : '';
-    const {path, kind} = this.brought;
+    const {path, kind} = this.imported;
     this.waits = true;
-    this.show(`Opening ${this.brought.name} \u2026`);
+    this.show(`Opening ${this.imported.name} \u2026`);
     const done = await act('open', {path, as, axes, ...(kind === 'volume' ? {volume: this.volume} : {})});
     if (!done) { this.waits = false; this.draw(); }
   }
@@ -111,21 +111,21 @@ export class Opener {
     if (!this.waits || job.name !== 'open' || job.state === 'running') { return; }
     this.waits = false;
     if (job.state === 'done') {
-      const notes = job.words, name = this.brought.name;
+      const notes = job.words, name = this.imported.name;
       this.batch = null;
-      this.brought = null;
+      this.imported = null;
       this.show(notes ? `${name}: ${notes}` : '');
       return;
     }
     this.draw();
-    say(job.state === 'stopped' ? 'Stopped; nothing has changed.' : words(job.words));
+    showMessage(job.state === 'stopped' ? 'Stopped; nothing has changed.' : words(job.words));
   }
 
-  // What was sent and is not wanted.
+  // Deletes the uploaded files that were not opened.
   async forget() {
     const {batch} = this;
     this.batch = null;
-    this.brought = null;
+    this.imported = null;
     this.waits = false;
     this.show('');
     if (batch) { await act('forget', {batch}); }
@@ -138,25 +138,25 @@ export class Opener {
   }
 
   draw() {
-    const {kind, name, path, ways} = this.brought, {landmarks, edited_vertices: edits, subject} = store.state;
+    const {kind, name, path, ways} = this.imported, {landmarks, edited_vertices: edits, subject} = store.state;
     const head = `this head${landmarks.length ? `, its ${landmarks.length} landmarks` : ''}${edits ? ', its edits' : ''}`;
-    const taken = kind === 'landmarks' ? `the ${landmarks.length} landmarks that are there` : head;
-    this.axes = kind === 'landmarks' ? select([['', 'as the file says'], ['LPS', 'LPS'], ['RAS', 'RAS']], '', () => {}) : null;
+    const replaced = kind === 'landmarks' ? `the present ${landmarks.length} landmarks` : head;
+    this.axes = kind === 'landmarks' ? select([['', 'as the file states'], ['LPS', 'LPS'], ['RAS', 'RAS']], '', () => {}) : null;
     const usable = ways.filter((way) => way !== 'skin' && way !== 'skull' && way !== 'options' || subject.triangles);
     this.root.hidden = false;
     this.root.replaceChildren(
         element('h2', {textContent: name}),
         element('p', {className: 'soft', textContent: `${KINDS[kind]}${this.batch ? '' : `: ${path}`}`}),
         (kind === 'landmarks' ? landmarks.length : subject.triangles)
-            ? element('p', {textContent: `${kind === 'landmarks' ? 'They take' : 'Another head takes'} the place of ${taken}. Undo brings it back.`}) : '',
-        this.axes ? field('axes', this.axes, 'where the file does not say') : '',
+            ? element('p', {textContent: `${kind === 'landmarks' ? 'The file replaces' : 'Another head replaces'} ${replaced}. Undo restores it.`}) : '',
+        this.axes ? field('axes', this.axes, 'used if the file states none') : '',
         kind === 'volume' ? this.volumeControls() : '',
         element('div', {className: 'ways'}, ...usable.map((way) => button(WAYS[kind][way], () => this.open(way), {dataset: {way}})),
-                button('Leave it', () => this.forget())));
+                button('Cancel', () => this.forget())));
     this.root.querySelector('.ways button').focus();
   }
 
-  // How a volume is read: each control from the program's own list.
+  // Options for reading a volume, with controls made from the program's schema.
   volumeControls() {
     const ct = kindOf(store.schema.properties.subject).objects.find((object) => object.properties.type.const === 'ct').properties;
     const row = (name, schema, target) => {
@@ -170,13 +170,13 @@ export class Opener {
       return field(`${name.replaceAll('_', ' ').replace(/ (mm|hu|cm2)$/, '')}${unit ? ` (${unit})` : ''}`, made);
     };
     const inner = () => { this.volume.import = this.volume.import || {}; return this.volume.import; };
-    return element('details', {open: Object.keys(this.volume).length > 0}, element('summary', {textContent: 'How it is read'}),
+    return element('details', {open: Object.keys(this.volume).length > 0}, element('summary', {textContent: 'Reading options'}),
         ...['series', 'fill_slices'].map((name) => row(name, ct[name], () => this.volume)),
         ...Object.entries(ct.import.properties).map(([name, schema]) => row(name, schema, inner)));
   }
 }
 
-// Files or a folder of the browser's own choosing, or a path on this machine.
+// Controls to choose files or a folder in the browser, or to enter a path on this machine.
 export const chooser = (opener, label, accept) => {
   const pick = (input) => opener.files([...input.files].map((file) => ({file, name: file.webkitRelativePath || file.name})))
       .finally(() => { input.value = ''; });
@@ -192,10 +192,10 @@ export const chooser = (opener, label, accept) => {
                  element('div', {className: 'row'}, path, open));
 };
 
-// A drop anywhere on the page.
+// Opens files that are dropped anywhere on the page.
 export const takeDrops = (opener) => {
   const isFile = (event) => event.dataTransfer && [...event.dataTransfer.types].includes('Files');
-  let depth = 0;  // of elements that the pointer has entered
+  let depth = 0;  // number of nested elements that the pointer has entered
   const mark = () => document.body.classList.toggle('dropping', depth > 0);
   document.addEventListener('dragenter', (event) => { if (isFile(event)) { ++depth; mark(); } });
   document.addEventListener('dragleave', (event) => { if (isFile(event)) { depth = Math.max(0, depth - 1); mark(); } });
@@ -205,6 +205,6 @@ export const takeDrops = (opener) => {
     event.preventDefault();
     depth = 0;
     mark();
-    filesOfDrop(event.dataTransfer).then((files) => opener.files(files)).catch((error) => say(error.message));
+    filesOfDrop(event.dataTransfer).then((files) => opener.files(files)).catch((error) => showMessage(error.message));
   });
 };

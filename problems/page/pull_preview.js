@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The face while a point of it is dragged: each vertex goes as the program says that it goes for each millimetre. The
-// pull itself is the program's, at release.
+// The face while a point of it is dragged. The program computes the displacement of each vertex per millimetre of the
+// pull; the page adds them up. At release the program makes the real pull.
 import {post} from './api.js';
 
 export class PullPreview {
@@ -8,13 +8,13 @@ export class PullPreview {
     this.scene = scene;
     this.geometry = scene.faceGeometry();
     this.before = this.geometry.attributes.position.array.slice();
-    this.moves = null;  // of a pull along x, y and z: of each coordinate, hundredths
+    this.moves = null;  // for pulls along x, y and z: each coordinate, in hundredths
     this.by = null;
     this.due = false;
     post('pull', {at: point.toArray(), ...options}).then(({per_mm: all}) => {
       this.moves = all.map((blobs) => blobs.map(SemblanceGeometry.valuesOf));
       if (this.by) { this.show(this.by); }
-    }).catch(() => {});  // the pull itself will say why
+    }).catch(() => {});  // the pull at release will show the error
   }
 
   show(by) {
@@ -28,7 +28,7 @@ export class PullPreview {
   }
 
   apply(by) {
-    if (this.scene.faceGeometry() !== this.geometry) { return; }  // another face has come meanwhile
+    if (this.scene.faceGeometry() !== this.geometry) { return; }  // another face was loaded meanwhile
     const {array} = this.geometry.attributes.position;
     for (let v = 0; v < array.length / 3; ++v) {
       for (let k = 0; k < 3; ++k) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is seen: skull, skin, landmarks, dowels and faces on one or several canvases under one camera. The canvases,
-// the camera and the measuring are those of a report's view (SemblanceStage, SemblanceCamera, SemblanceMeasure).
+// The 3-D view: skull, skin, landmarks, depth markers and faces on one or several canvases under one camera. Canvases,
+// camera and measuring are those of a report's view (SemblanceStage, SemblanceCamera, SemblanceMeasure).
 import {element} from './dom.js';
 import {changeBetween} from './changes.js';
 import {nameOf} from './store.js';
@@ -8,11 +8,11 @@ import {nameOf} from './store.js';
 const LAYERS = {
   skull: {label: 'Skull', colour: '#e8dcc4'},
   skin: {label: 'True skin', colour: '#b9c7d6'},
-  dowels: {label: 'Dowels', colour: '#b3261e'},
+  dowels: {label: 'Depth markers', colour: '#b3261e'},
   face: {label: 'Face', colour: '#d8a58a'},
 };
 const MAPS = {
-  change: {title: 'change along the face, outwards +', low_mm: -8, high_mm: 8, no_data: '#8f8f8f',
+  change: {title: 'change of the face, outwards +', low_mm: -8, high_mm: 8, no_data: '#8f8f8f',
            colours: ['#053061', '#2166ac', '#4393c3', '#92c5de', '#d1e5f0', '#f7f7f7', '#fddbc7', '#f4a582', '#d6604d',
                      '#b2182b', '#67001f']},
 };
@@ -29,14 +29,15 @@ export class Scene {
       this.shared.layers.set(id, {shown: id !== 'skin', opacity: id === 'face' ? 0.75 : id === 'skin' ? 0.4 : 1});
     }
     this.frames = element('div', {className: 'view3d-frames'});
-    root.append(this.frames);  // first: a canvas takes its ground from the page's style
-    this.awaitsFace = false;   // the camera goes round a skull that has none yet
+    root.append(this.frames);  // before the first canvas, which takes its background from the page's style
+    this.awaitsFace = false;   // true while the camera is centred on a skull without a face
     this.main = this.makeFrame('');
     this.others = [];
     this.marks = new THREE.Group();
     this.main.stage.extra.add(this.marks);
-    this.onPick = null;  // (hitOf, ray, among) of a click
-    this.onDrag = null;  // (event) => {move(event, still), end(), cancel()} for a press that is not the camera's, or null
+    this.onPick = null;  // called with (hitOf, ray, among) for a click
+    // (event) => {move(event, still), end(), cancel()}, or null for a press that the camera handles.
+    this.onDrag = null;
     this.attachDrag(this.main);
     this.compass = element('canvas', {className: 'view3d-compass', width: 224, height: 224});
     this.compass.setAttribute('aria-hidden', 'true');
@@ -58,7 +59,7 @@ export class Scene {
     return {frame, canvas, stage, head};
   }
 
-  // A mesh, as the program sends it; null takes it away.
+  // Shows a mesh in the format of the program's replies, or removes it if the blob is null.
   put(id, blob, frame = this.main) {
     if (!blob) { frame.stage.drop(id); this.draw(); return; }
     this.blobs = {...this.blobs, [id]: blob};
@@ -70,12 +71,12 @@ export class Scene {
   }
 
   putDowels(dowels, frame = this.main) {
-    const named = dowels.map((dowel) => ({...dowel, name: nameOf(dowel.site), fitted: 'not told'}));
+    const named = dowels.map((dowel) => ({...dowel, name: nameOf(dowel.site), fitted: 'unknown'}));
     frame.stage.put({id: 'dowels', ...LAYERS.dowels, dowels: named}, {});
     frame.stage.update();
   }
 
-  // Colours the face by how far it lies outside `former`, a face of the same vertices.
+  // Colours the face by its distance outside `former`, a face with the same vertices.
   colourChange(former, frame = this.main) {
     const face = frame.stage.layers.get('face');
     if (!face) { return null; }
@@ -89,7 +90,7 @@ export class Scene {
     return values;
   }
 
-  // Of the colours that are on show.
+  // Shows the legend of the visible colours.
   showLegend() {
     const shown = this.others.length ? this.others : [this.main];
     const mapped = this.shared.layers.get('face').shown && shown.some(({stage}) => stage.layers.get('face')?.layer.always_mapped);
@@ -101,7 +102,7 @@ export class Scene {
     return face ? face.object.geometry : null;
   }
 
-  // The camera goes round the skull, and round the face once there is one: it may reach far below what is left of a skull.
+  // Centres the camera on the skull and on the face, if there is one: a face may reach far below an incomplete skull.
   frame() {
     const {main: {stage}} = this, box = new THREE.Box3(), around = {skull: 0.12, face: 0.04};
     for (const {layer: {id}, object: {geometry}} of stage.layers.values()) {
@@ -121,7 +122,7 @@ export class Scene {
     this.awaitsFace = !this.faceGeometry();
   }
 
-  // A click that is no drag goes to whoever wants it.
+  // Passes a click without a drag to onPick.
   attachPick({canvas, stage}) {
     let press = null;
     canvas.addEventListener('pointerdown', (event) => { press = {x: event.clientX, y: event.clientY}; });
@@ -134,8 +135,8 @@ export class Scene {
     });
   }
 
-  // A press that onDrag takes is kept from the camera and from clicks until it is released; Escape and a second finger
-  // take it back.
+  // If onDrag accepts a press, neither the camera nor onPick gets it until its release. Escape or a second finger
+  // cancels the drag.
   attachDrag({canvas, stage}) {
     let grip = null, start = null;
     const over = canvas.parentElement, stop = () => { grip = null; };
@@ -188,19 +189,19 @@ export class Scene {
     this.draw();
   }
 
-  // A line from a to b, or none.
+  // Shows an arrow from a to b, or removes it.
   putArrow(from, to) {
     if (this.arrow) { this.main.stage.extra.remove(this.arrow); this.arrow = null; }
     if (from) {
-      const way = to.clone().sub(from);
-      this.arrow = new THREE.ArrowHelper(way.clone().normalize(), from, Math.max(1, way.length()), 0x0b5c8f, 4, 2.5);
+      const shift = to.clone().sub(from);
+      this.arrow = new THREE.ArrowHelper(shift.clone().normalize(), from, Math.max(1, shift.length()), 0x0b5c8f, 4, 2.5);
       this.main.stage.extra.add(this.arrow);
     }
     this.draw();
   }
 
-  // Further canvases beside the main one, for faces to compare: [{title, face, dowels, former}]. caption: of a title and
-  // the differences from `former`, where there is one.
+  // Shows faces to compare on further canvases: [{title, face, dowels, former}]. caption: makes the heading from a title
+  // and the differences from `former`, if there is one.
   compare(variants, {coloured = true, caption = (title) => [title]} = {}) {
     for (const other of this.others) { other.frame.remove(); other.stage.renderer.dispose(); }
     this.others = [];

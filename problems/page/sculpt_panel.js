@@ -1,38 +1,39 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Changing the face by hand: a point of it is pressed and dragged, or held and pulled by buttons and keys, at the level
-// that is chosen. Every pull is an edit of control vertices in edits.yaml, which `semblance edit` and `semblance run`
-// replay.
+// Editing the face by hand: a point of it is dragged, or held and pulled by buttons and keys, at the chosen level. Every
+// pull is an edit of control vertices in edits.yaml, which `semblance edit` and `semblance run` replay.
 import {button, check, element, field, group, select} from './dom.js';
 import {get} from './api.js';
 import {PullPreview} from './pull_preview.js';
-import {act, say, store} from './store.js';
+import {act, showMessage, store} from './store.js';
 
-const MOST_MM = 60;      // of one drag
-const FACING = 0.35;     // a normal that is seen shorter than this is dragged up and down
+const MAX_DRAG_MM = 60;
+// A normal whose projection on the view is shorter than this points nearly at the viewer. Up and down then pull along it,
+// because its direction in the view is too uncertain.
+const FACING = 0.35;
 const KEYS = {o: 'out', i: 'in', a: 'left', d: 'right', w: 'up', s: 'down'};
 
-// Millimetres for a pixel of the canvas at a point.
+// Size of a pixel of the canvas in mm at a point.
 const pixelSize = (stage, point) => {
   const {camera} = stage.shared.camera;
   return 2 * camera.position.distanceTo(point) * Math.tan(camera.fov * Math.PI / 360) / stage.canvas.clientHeight;
 };
 
-// The camera's right and up.
+// Unit vectors to the right and up in the view.
 const viewAxes = (stage) => {
   const axes = [new THREE.Vector3(), new THREE.Vector3(), new THREE.Vector3()];
   stage.shared.camera.camera.matrixWorld.extractBasis(...axes);
   return {right: axes[0], up: axes[1]};
 };
 
-// The pull of a pointer that has gone right and down by pixels.
+// The pull in mm for a pointer that moved by pixels to the right and down.
 const pullOf = (stage, held, mode, right, down) => {
   const size = pixelSize(stage, held.point), axes = viewAxes(stage);
   if (mode === 'view') {
-    return axes.right.multiplyScalar(right * size).addScaledVector(axes.up, -down * size).clampLength(0, MOST_MM);
+    return axes.right.multiplyScalar(right * size).addScaledVector(axes.up, -down * size).clampLength(0, MAX_DRAG_MM);
   }
   const across = held.normal.dot(axes.right), upwards = held.normal.dot(axes.up), seen = Math.hypot(across, upwards);
   const by = seen > FACING ? (right * across - down * upwards) * size / (seen * seen) : -down * size;
-  return held.normal.clone().multiplyScalar(Math.max(-MOST_MM, Math.min(MOST_MM, by)));
+  return held.normal.clone().multiplyScalar(Math.max(-MAX_DRAG_MM, Math.min(MAX_DRAG_MM, by)));
 };
 
 export function sculptPanel({scene, faces}) {
@@ -85,16 +86,16 @@ export function sculptPanel({scene, faces}) {
     const box = stage.canvas.getBoundingClientRect();
     const found = pointAt({clientX: box.left + box.width / 2, clientY: box.top + box.height / 2});
     hold(found);
-    way.textContent = found ? 'The point in the middle of the view is held.' : 'The face is not in the middle of the view.';
+    way.textContent = found ? 'The point in the middle of the view is held.' : 'No point of the face is in the middle of the view.';
   };
 
-  // A press on the face: a grip for Scene.onDrag, or nothing.
+  // Handles a press on the face for Scene.onDrag; null for a press elsewhere.
   const grip = (event) => {
     const found = drags.checked && store.state.face.fresh && faces.kind === 'full' && pointAt(event);
     if (!found) { return null; }
     const start = {x: event.clientX, y: event.clientY};
     let preview = null, by = null;
-    const tell = () => { way.textContent = `${by.length().toFixed(1)} mm`; };
+    const showLength = () => { way.textContent = `${by.length().toFixed(1)} mm`; };
     return {
       move: (next, still) => {
         if (still) { return; }
@@ -105,7 +106,7 @@ export function sculptPanel({scene, faces}) {
         by = pullOf(stage, found, mode.value, next.clientX - start.x, next.clientY - start.y);
         scene.putArrow(found.point, found.point.clone().add(by));
         preview.show(by);
-        tell();
+        showLength();
       },
       end: async () => {
         hold(found);
@@ -137,22 +138,22 @@ export function sculptPanel({scene, faces}) {
     });
     library.replaceChildren(group('Features',
         element('div', {className: 'row'}, part, name, keep),
-        element('small', {className: 'doc', textContent: 'Keeps the detail of a part in features/; the slider mixes one that is kept into this face.'}),
+        element('small', {className: 'doc', textContent: 'Stores the detail of a part in features/; the slider blends a stored feature into this face.'}),
         ...features.map((feature) => field(feature, element('input', {type: 'range', min: 0, max: 1, step: 0.05, value: 0,
             onchange: (event) => act('blend_feature', {name: feature, weight: Number(event.target.value)})})))));
   };
 
   const root = element('div', {}, words,
       group('Pull',
-            field('level', element('span', {className: 'row'}, level, levelWords), 'a coarse level moves much of the face, a fine one little'),
-            field('how far around', reach), check('Both sides alike', mirror),
-            check('A drag on the face pulls it', drags), field('a drag pulls', mode, 'a normal that points at you: up pulls out'), way),
+            field('level', element('span', {className: 'row'}, level, levelWords), 'a coarse level moves a large part of the face, a fine one a small part'),
+            field('reach', reach), check('Both sides', mirror),
+            check('A drag on the face pulls it', drags), field('a drag pulls', mode, 'if the normal points at you, up pulls out'), way),
       group('By buttons and keys',
             button('Hold the point in the middle', holdMiddle, {title: 'H', dataset: {pull: 'hold'}}),
             field('distance (mm)', distance), element('div', {className: 'row'}, ways.out, ways.in),
             element('div', {className: 'row'}, ways.left, ways.right, ways.up, ways.down),
-            element('small', {className: 'doc', textContent: 'H holds the point in the middle of the view, O and I pull it out and push it in, W A S D move it in the plane of the view; Escape lets it go.'})),
-      library, count, button('Take all edits back', () => act('clear_edits')));
+            element('small', {className: 'doc', textContent: 'H holds the point in the middle of the view, O and I pull it out and push it in, W A S D move it in the plane of the view; Escape releases it.'})),
+      library, count, button('Remove all edits', () => act('clear_edits')));
 
   document.addEventListener('keydown', (event) => {
     const types = ['INPUT', 'SELECT', 'TEXTAREA'].includes(event.target.tagName) && event.target.type !== 'range' && event.target.type !== 'checkbox';
@@ -165,13 +166,13 @@ export function sculptPanel({scene, faces}) {
 
   const state = (now) => {
     const ready = now.face.fresh;
-    words.textContent = ready ? 'Press a point of the face and drag it; beside the face a drag turns the head. A click holds a point for the buttons.'
-                              : 'Sculpting begins on the full face of the present choices: make it first (the button at the top).';
+    words.textContent = ready ? 'Drag a point of the face to pull it; a drag beside the face turns the head. A click holds a point for the buttons.'
+                              : 'Sculpting needs the full face of the present options: make it first (the button at the top).';
     for (const control of root.querySelectorAll('input, select, fieldset button')) {
       if (!Object.values(ways).includes(control)) { control.disabled = !ready; }
     }
-    count.textContent = now.edited_vertices ? `${now.edited_vertices} control vertices are edited.` : 'Nothing is edited.';
-    if (faces.finest) {  // a face may have fewer levels than the one that is chosen
+    count.textContent = now.edited_vertices ? `${now.edited_vertices} control vertices are edited.` : 'No control vertex is edited.';
+    if (faces.finest) {  // the face may have fewer levels than the chosen one
       level.max = faces.finest;
       options.level = Number(level.value);
       levelWords.textContent = level.value;
@@ -183,7 +184,7 @@ export function sculptPanel({scene, faces}) {
     show: () => {
       scene.onPick = pick;
       scene.onDrag = grip;
-      drawLibrary().catch((error) => say(error.message)).then(() => state(store.state));
+      drawLibrary().catch((error) => showMessage(error.message)).then(() => state(store.state));
     },
     hide: () => { scene.onPick = null; scene.onDrag = null; hold(null); }
   };

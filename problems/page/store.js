@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The state as the program told it last, and who wants to hear of it. The page keeps no truth of its own.
+// The last state from the program, and the listeners to its changes. The page stores no decisions of its own.
 import {get, getFile, post} from './api.js';
 import {element} from './dom.js';
 
@@ -8,50 +8,50 @@ export const store = {state: null, schema: null, sites: [], files: null, site: n
 const listeners = [];
 export const onState = (listener) => { listeners.push(listener); };
 
-// What a person has to read: a fault, or nothing.
-export const say = (words) => {
+// Shows a message to the person, or hides it if the text is empty.
+export const showMessage = (words) => {
   const box = document.getElementById('message');
   box.textContent = words || '';
   box.hidden = !words;
 };
 
-export const take = (state) => {
+export const setState = (state) => {
   const former = store.state;
   store.state = state;
   for (const listener of listeners) { listener(state, former); }
 };
 
-// Does one thing; a refusal is shown, and nothing has changed then. Whether it was done.
+// Performs one action. If the program refuses it, nothing changes and the reason is shown. Returns true if it was done.
 export const act = async (name, details = {}) => {
   try {
-    take(await post('act', {do: name, ...details}));
-    say('');
+    setState(await post('act', {do: name, ...details}));
+    showMessage('');
     return true;
   } catch (error) {
-    say(error.message);
+    showMessage(error.message);
     return false;
   }
 };
 
-// The browser keeps a file that the program makes; a refusal is shown.
-export const keep = async (path, query) => {
+// Saves a file made by the program through the browser. If the program refuses, the reason is shown.
+export const download = async (path, query) => {
   try {
     const {name, blob} = await getFile(path, query);
     const address = URL.createObjectURL(blob);
     element('a', {href: address, download: name}).click();
-    setTimeout(() => URL.revokeObjectURL(address), 60000);  // a browser may ask the person first where to
-    say('');
+    setTimeout(() => URL.revokeObjectURL(address), 60000);  // the browser may ask for a place first
+    showMessage('');
   } catch (error) {
-    say(error.message);
+    showMessage(error.message);
   }
 };
 
-export const refresh = async () => take(await get('state'));
+export const refresh = async () => setState(await get('state'));
 
 export const begin = async () => {
   const [state, schema, sites, files] = await Promise.all([get('state'), get('schema'), get('sites'), get('files')]);
   Object.assign(store, {schema, sites, files});
-  take(state);
+  setState(state);
 };
 
 export const siteOf = (code) => store.sites.find((site) => site.site === code);
@@ -61,7 +61,7 @@ export const nameOf = (code) => {
   return site ? `${site.name}${side}` : code;
 };
 
-// A site is in hand: what the next click on the bone places.
+// The chosen site, which the next click on the bone places.
 const choosers = [];
 export const onChoice = (listener) => { choosers.push(listener); };
 export const choose = (code) => {

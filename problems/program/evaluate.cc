@@ -31,14 +31,14 @@ TriMesh ReadFace(const std::filesystem::path& path) {
                                      : ReadChecked(path);
 }
 
-// A true skin, and what is known of how it is scored.
+// A true skin, with its scored region and the basis of the scores.
 struct Truth {
   TriMesh skin;
   ScoredSkin scored;
   ScoreBasis basis;
 };
 
-Truth OfExperiment(const EvaluateOptions& options, const RunContext& context) {
+Truth ReadTruthOfExperiment(const EvaluateOptions& options, const RunContext& context) {
   const auto experiment = ReadConfig<Experiment>(options.config, options.overrides);
   CheckNetworkNamed(experiment, options.config);
   Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment);
@@ -55,7 +55,7 @@ Truth OfExperiment(const EvaluateOptions& options, const RunContext& context) {
   return {std::move(*subject.skin), std::move(scored), std::move(subject.basis)};
 }
 
-std::vector<Dowel> DowelsOf(const LandmarkFile& file) {
+std::vector<Dowel> MakeDowels(const LandmarkFile& file) {
   std::vector<Dowel> dowels;
   for (const Landmark& landmark : file.landmarks) {
     const auto& p = landmark.point;
@@ -68,7 +68,7 @@ std::vector<Dowel> DowelsOf(const LandmarkFile& file) {
   return dowels;
 }
 
-Truth OfFiles(const EvaluateOptions& options) {
+Truth ReadTruthFiles(const EvaluateOptions& options) {
   if (options.truth.empty()) {
     throw InputError(
         "evaluate: there is nothing to compare the face with; name the mesh of the true skin after "
@@ -85,9 +85,9 @@ Truth OfFiles(const EvaluateOptions& options) {
     truth.scored = AllScored(truth.skin);
     return truth;
   }
-  truth.basis = BasisOf(DowelsOf(ReadLandmarks(options.landmarks).file));
+  truth.basis = BasisOf(MakeDowels(ReadLandmarks(options.landmarks).file));
   if (!truth.basis.sites) {
-    throw InputError(fmt::format("{}: fewer than three landmarks do not say where the face is",
+    throw InputError(fmt::format("{}: fewer than three landmarks do not locate the face; add some",
                                  options.landmarks.string()));
   }
   truth.scored =
@@ -104,7 +104,8 @@ nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext
         "out, or change it with --set");
   }
   const TriMesh face = ReadFace(options.face);
-  const Truth truth = options.config.empty() ? OfFiles(options) : OfExperiment(options, context);
+  const Truth truth =
+      options.config.empty() ? ReadTruthFiles(options) : ReadTruthOfExperiment(options, context);
   return ScoreToJson(CompareFaces(truth.skin, truth.scored.region, face, context),
                      MeasureDetails(truth.skin, truth.scored, truth.basis, face, context),
                      truth.scored);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// `semblance evaluate`: a face against the true skin, without a run.
+// `semblance evaluate`: compares a face with the true skin, without a run.
 #pragma once
 
 #include <filesystem>
@@ -13,21 +13,21 @@
 namespace semblance {
 
 struct EvaluateOptions {
-  std::filesystem::path face;          // mesh, or a run's face.hspline.json
-  std::filesystem::path truth;         // mesh of the skin; empty: that of the configuration
-  std::filesystem::path config;        // of an experiment: its subject, landmarks and region
+  std::filesystem::path face;    // mesh, or a run's face.hspline.json
+  std::filesystem::path truth;   // mesh of the skin; empty: the skin of the configuration
+  std::filesystem::path config;  // experiment with subject, landmarks and region; may be empty
   std::vector<std::string> overrides;  // of the configuration
-  std::filesystem::path landmarks;     // of the truth's skull, where there is no configuration
-  std::vector<ExcludedZone> exclude;   // likewise
+  std::filesystem::path landmarks;     // on the true skull; only without a configuration
+  std::vector<ExcludedZone> exclude;   // not scored; only without a configuration
 };
 
-// What result.json says under `face`, to the bit if face.hspline.json and the configuration of the
-// run are given. With neither configuration nor landmarks all of the truth is scored, as it is
-// unknown what of it is the face. Throws InputError for files or options that do not go together;
-// as Run does for the configuration; IoError.
+// Returns the entry `face` of result.json. For the face.hspline.json and the configuration of a run
+// the numbers are identical to those of the run. Without configuration and landmarks the whole
+// truth is scored, because the region of the face is unknown. Throws InputError for files or
+// options that cannot be combined, IoError, and as Run does for the configuration.
 nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext& context);
 
-// "zy_r=15", a site and a radius in mm. Throws InputError for another form.
+// Parses a site and a radius in mm, e.g. "zy_r=15". Throws InputError for any other form.
 ExcludedZone ParseZone(const std::string& text);
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/face_commands.h"
+#include "problems/program/all_commands.h"
 
 #include <fmt/format.h>
 
@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the user typed; each command reads its part.
+// The arguments of all commands of this file. Each command reads its part.
 struct FaceArguments {
   std::string face, script, inverse, out, name, library;
   std::vector<std::string> features;
@@ -42,43 +42,44 @@ struct FaceArguments {
   bool force = false;
 };
 
-// given: what the command reads.
+// given: the files that the command reads.
 void CheckFree(const fs::path& path, const FaceArguments& a, std::span<const fs::path> given) {
   RefuseToReplace(path, given);
   RefuseExisting(path, a.force);
 }
 
-// Two outputs of one name: one would be lost.
-void RefuseOneName(const std::string& out, const std::string& other) {
+// Throws InputError if two outputs have the same name, because one would be lost.
+void RefuseSameName(const std::string& out, const std::string& other) {
   const auto resolved = [](const std::string& name) {
     return fs::weakly_canonical(fs::absolute(name));
   };
   if (!other.empty() && resolved(out) == resolved(other)) {
-    throw InputError(fmt::format("{}: --out and --inverse name the same file; name two", out));
+    throw InputError(
+        fmt::format("{}: --out and --inverse name the same file; give two names", out));
   }
 }
 
-// What is wrong with what a file holds is said with its name.
-InputError Named(const InputError& error, const std::string& file) {
+// Adds the name of the file to the message if it lacks it.
+InputError WithFileName(const InputError& error, const std::string& file) {
   const std::string words = error.what();
   return InputError(words.find(file) == words.npos ? fmt::format("{}: {}", file, words) : words);
 }
 
-EditScript Edited(const std::string& script, HSplineSurface& face) {
+EditScript ApplyScript(const std::string& script, HSplineSurface& face) {
   const EditScript edits = ReadEditScript(script);
   try {
     return ApplyEdits(edits, face);
   } catch (const InputError& error) {
-    throw Named(error, script);
+    throw WithFileName(error, script);
   }
 }
 
 int Edit(const FaceArguments& a) {
   const std::array<fs::path, 2> given = {a.face, a.script};
   CheckFree(a.out, a, given);
-  RefuseOneName(a.out, a.inverse);
+  RefuseSameName(a.out, a.inverse);
   HSplineSurface face = ReadHSpline(a.face);
-  const EditScript inverse = Edited(a.script, face);
+  const EditScript inverse = ApplyScript(a.script, face);
   if (!a.inverse.empty()) {
     CheckFree(a.inverse, a, given);
     WriteFileAtomically(a.inverse, WriteConfig(inverse));
@@ -98,7 +99,7 @@ int Export(const FaceArguments& a) try {
   fmt::print("{}: {} bytes\n", a.out, bytes.size());
   return kDone;
 } catch (const InputError& error) {
-  throw Named(error, a.face);
+  throw WithFileName(error, a.face);
 }
 
 int Store(const Feature& feature, const FaceArguments& a, std::span<const fs::path> given) {
@@ -165,15 +166,15 @@ int ListCommand(const FaceArguments& a) {
   return kDone;
 }
 
-// The face that `semblance template` has written into a folder.
-FileTemplate TemplateIn(const fs::path& folder) {
+// The files that `semblance template` writes into a folder.
+FileTemplate TemplateFiles(const fs::path& folder) {
   return {.surface = folder / "head.hspline.json",
           .sites = folder / "sites.csv",
           .features = folder / "features.json"};
 }
 
 int PriorCommand(const FaceArguments& a) {
-  const FileTemplate files = TemplateIn(a.template_folder);
+  const FileTemplate files = TemplateFiles(a.template_folder);
   std::vector<fs::path> given = ModesPriorFiles(a.prior);
   given.insert(given.end(), {files.surface, files.sites, files.features});
   CheckFree(a.out, a, given);
@@ -203,9 +204,9 @@ void AddFace(CLI::App& command, FaceArguments& a) {
   command.add_option("FACE", a.face, "H-spline (.json)")->required();
 }
 
-// Where a new feature goes.
+// Adds the options for storing a new feature.
 void AddStore(CLI::App& command, FaceArguments& a) {
-  command.add_option("--name", a.name, "of the new feature: letters, digits, '-' and '_'")
+  command.add_option("--name", a.name, "name of the new feature: letters, digits, '-' and '_'")
       ->required();
   command.add_option("--library", a.library, "folder to store it in")->required();
   AddForce(command, a);
@@ -214,9 +215,10 @@ void AddStore(CLI::App& command, FaceArguments& a) {
 void DeclareEdit(CLI::App& edit, CommandLine& line) {
   FaceArguments& a = *Bind(edit, line, &Edit);
   AddFace(edit, a);
-  edit.add_option("SCRIPT", a.script, "what to reset and to move (.yaml)")->required();
+  edit.add_option("SCRIPT", a.script, "edit script: vertices to reset and to move (.yaml)")
+      ->required();
   edit.add_option("--out", a.out, "file for the edited face")->required();
-  edit.add_option("--inverse", a.inverse, "file for the script that takes the edits back");
+  edit.add_option("--inverse", a.inverse, "file for the script that reverses the edits");
   AddForce(edit, a);
 }
 
@@ -225,13 +227,14 @@ void DeclareExport(CLI::App& to, CommandLine& line) {
   to.add_option("FROM", a.face,
                 "an H-spline (.json), a mesh (.ply .obj .off .stl) or the folder of a run")
       ->required();
-  to.add_option("--to", a.out,
-                "file; of an H-spline exact: .vtu .step .iges, triangles: .glb .vtp .ply .obj .off "
-                ".stl; of a mesh with its values: .vtp .vtu .ply, colours: .glb, shape: .obj .off "
-                ".stl; of a run: .glb with skull, face and dowels")
+  to.add_option(
+        "--to", a.out,
+        "file; for an H-spline exact: .vtu .step .iges, triangles: .glb .vtp .ply .obj .off "
+        ".stl; for a mesh with its values: .vtp .vtu .ply, with colours: .glb, shape alone: "
+        ".obj .off .stl; for a run: .glb with skull, face and depth markers")
       ->required();
   to.add_option("--chord_mm", a.chord_mm,
-                "how far a triangle of an H-spline may be from the surface [0.1]")
+                "largest distance of a triangle from the surface of an H-spline [0.1]")
       ->check(Finite());
   to.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
       ->check(CLI::Range(1, 1024));
@@ -241,7 +244,9 @@ void DeclareExport(CLI::App& to, CommandLine& line) {
 void DeclareExtract(CLI::App& extract, CommandLine& line) {
   FaceArguments& a = *Bind(extract, line, &ExtractCommand);
   AddFace(extract, a);
-  extract.add_option("--u", a.u, "lowest and highest u; lowest > highest runs across the seam")
+  extract
+      .add_option("--u", a.u,
+                  "lowest and highest u; lowest > highest means a range across the seam")
       ->check(Finite())
       ->check(CLI::Range(0.0, 1.0));
   extract.add_option("--v", a.v, "lowest and highest v")
@@ -254,7 +259,8 @@ void DeclareExtract(CLI::App& extract, CommandLine& line) {
 void DeclareApply(CLI::App& apply, CommandLine& line) {
   FaceArguments& a = *Bind(apply, line, &ApplyCommand);
   AddFace(apply, a);
-  apply.add_option("FEATURE", a.features, "files of a library; later ones win")->required();
+  apply.add_option("FEATURE", a.features, "files of a library; later ones replace earlier ones")
+      ->required();
   apply.add_option("--out", a.out, "file for the new face")->required();
   AddForce(apply, a);
 }
@@ -262,7 +268,7 @@ void DeclareApply(CLI::App& apply, CommandLine& line) {
 void DeclareBlend(CLI::App& blend, CommandLine& line) {
   FaceArguments& a = *Bind(blend, line, &BlendCommand);
   blend.add_option("FEATURE", a.features, "files of a library")->required();
-  blend.add_option("--weights", a.weights, "one per feature; outside 0..1 it extrapolates")
+  blend.add_option("--weights", a.weights, "one per feature; a weight outside 0..1 extrapolates")
       ->required()
       ->check(Finite());
   AddStore(blend, a);
@@ -279,7 +285,8 @@ void DeclareList(CLI::App& list, CommandLine& line) {
   list.add_option("LIBRARY", a.library, "folder")->required();
 }
 
-// The range of prior.scale. CLI::Range would call its lower end 0.000000, which is not allowed.
+// Checks the range of prior.scale. CLI::Range would print its lower end as 0.000000, which is not
+// allowed.
 CLI::Validator AsPriorScale() {
   return {[](std::string& text) -> std::string {
             double scale = 0;
@@ -304,13 +311,16 @@ void DeclarePrior(CLI::App& prior, CommandLine& line) {
       .add_option("--features", a.prior.features,
                   "the 68 facial landmarks on the mean (.csv: i_multipie,x,y,z)")
       ->required();
-  prior.add_option("--template", a.template_folder, "what `semblance template MEAN` has written")
+  prior
+      .add_option("--template", a.template_folder,
+                  "folder that `semblance template MEAN` has written")
       ->required();
   prior.add_option("--out", a.out, "file for the modes (.json)")->required();
   prior.add_option("--scale", a.prior.scale, "mm per unit of an array of modes [1]")
       ->check(AsPriorScale());
-  prior.add_option("--modes", a.prior.count, "how many, at most [60]")->check(CLI::Range(1, 10000));
-  prior.add_option("--level", a.level, "of the B-splines that hold them [2]")
+  prior.add_option("--modes", a.prior.count, "largest number of modes [60]")
+      ->check(CLI::Range(1, 10000));
+  prior.add_option("--level", a.level, "level of the B-splines that represent them [2]")
       ->check(CLI::Range(0, 8));
   prior.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
       ->check(CLI::Range(1, 1024));
@@ -319,11 +329,11 @@ void DeclarePrior(CLI::App& prior, CommandLine& line) {
 }
 
 constexpr std::array kFeatureCommands = {
-    ProgramCommand{"extract", "take detail from a face", &DeclareExtract},
-    ProgramCommand{"apply", "give features to a face", &DeclareApply},
+    ProgramCommand{"extract", "extract detail from a face", &DeclareExtract},
+    ProgramCommand{"apply", "apply features to a face", &DeclareApply},
     ProgramCommand{"blend", "make a weighted sum of features", &DeclareBlend},
     ProgramCommand{"mirror", "make a feature for the other side", &DeclareMirror},
-    ProgramCommand{"list", "say what a library holds", &DeclareList},
+    ProgramCommand{"list", "list the features of a library", &DeclareList},
 };
 
 void DeclareFeature(CLI::App& feature, CommandLine& line) {
@@ -335,11 +345,11 @@ void DeclareFeature(CLI::App& feature, CommandLine& line) {
 
 std::span<const ProgramCommand> FaceCommands() {
   static constexpr std::array kCommands = {
-      ProgramCommand{"edit", "move vertices of an H-spline face as a script says", &DeclareEdit},
+      ProgramCommand{"edit", "move vertices of an H-spline face by a script", &DeclareEdit},
       ProgramCommand{"export", "write a face, a mesh or a run for other programs", &DeclareExport},
-      ProgramCommand{"prior", "put the modes of a face model onto the H-spline of its mean",
+      ProgramCommand{"prior", "transfer the modes of a face model to the H-spline of its mean",
                      &DeclarePrior},
-      ProgramCommand{"feature", "carry detail from one face to another (thesis 4.3)",
+      ProgramCommand{"feature", "transfer detail from one face to another (thesis 4.3)",
                      &DeclareFeature},
   };
   return kCommands;

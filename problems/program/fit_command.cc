@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/fit_command.h"
+#include "problems/program/all_commands.h"
 
 #include <fmt/format.h>
 
@@ -55,10 +55,10 @@ int FitCommand(const FitArguments& arguments) {
   const std::filesystem::path path = arguments.files.at(0);
   const PointFitOptions options = ReadFitOptions(arguments);
   const std::string name = path == "-" ? "standard input" : path.filename().string();
-  StagedFolder folder = FolderOf(arguments, "out/" + (path == "-" ? "points" : PlainName(path)),
-                                 ListFiles(arguments));
+  StagedFolder folder = MakeStagedFolder(
+      arguments, "out/" + (path == "-" ? "points" : PlainName(path)), ListFiles(arguments));
   PointFile file = ReadPointFile(path, options.attributes);
-  const RunContext context = ContextOf(arguments);
+  const RunContext context = MakeRunContext(arguments);
   const PointFit result = FitPoints(std::move(file.points), options, context);
   const std::vector<std::string> notes = WritePointFit(
       options, {.name = name, .sha256 = file.sha256}, result, folder.Files(), context);
@@ -77,7 +77,7 @@ int FitCommand(const FitArguments& arguments) {
     fmt::print("{}\n", ToleranceText(*tolerance));
   }
   fmt::print("folder: {}\n", folder.Root().string());
-  return TellFaults(result.Faults());
+  return PrintFaults(result.Faults());
 }
 
 void DeclareFit(CLI::App& command, CommandLine& line) {

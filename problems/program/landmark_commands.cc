@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/landmark_commands.h"
+#include "problems/program/all_commands.h"
 
 #include <fmt/format.h>
 
@@ -30,7 +30,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the user typed.
+// The arguments of `landmarks convert` and `landmarks page`.
 struct LandmarkArguments {
   std::string in, out;
   std::vector<std::string> tables;
@@ -38,7 +38,7 @@ struct LandmarkArguments {
   bool force = false;
 };
 
-void TellEach(const std::vector<std::string>& lines, const char* what) {
+void PrintEach(const std::vector<std::string>& lines, const char* what) {
   for (const std::string& line : lines) {
     fmt::print(stderr, "{}", ForTerminal(fmt::format("{}: {}\n", what, line)));
   }
@@ -49,8 +49,8 @@ int Convert(const LandmarkArguments& a) {
   RefuseExisting(a.out, a.force);
   const LandmarkReading reading = ReadLandmarks(a.in, a.reading);
   const std::string bytes = EncodeLandmarks(reading.file, a.out);
-  TellEach(reading.notes, "note");
-  TellEach(LostIn(reading.file, a.out), "not kept in this kind of file");
+  PrintEach(reading.notes, "note");
+  PrintEach(LostIn(reading.file, a.out), "not kept in this kind of file");
   WriteFileAtomically(a.out, bytes);
   fmt::print("{}: {} landmarks, mm, LPS\n", a.out, reading.file.landmarks.size());
   return kDone;
@@ -75,9 +75,9 @@ int Page(const LandmarkArguments& a) {
 
 void DeclarePage(CLI::App& page, CommandLine& line) {
   LandmarkArguments& a = *Bind(page, line, &Page);
-  page.add_option("TABLES", a.tables, "tissue tables to say which sites they have")->required();
+  page.add_option("TABLES", a.tables, "tissue tables whose sites the page marks")->required();
   page.add_option("--out", a.out, "folder for sites.md and sites.svg")->required();
-  page.add_flag("--force", a.force, "replace them where they are");
+  page.add_flag("--force", a.force, "replace existing files");
 }
 
 void DeclareConvert(CLI::App& convert, CommandLine& line) {
@@ -85,14 +85,14 @@ void DeclareConvert(CLI::App& convert, CommandLine& line) {
   convert.add_option("IN", a.in, ".yaml, .mrk.json, .fcsv, .pp, .csv, .txt or .asc")->required();
   convert.add_option("OUT", a.out, "file of one of these kinds")->required();
   AddChoice(convert, "--axes",
-            "LPS or RAS: of a file that does not say (.pp, .csv, .txt, .asc) [LPS]",
+            "LPS or RAS: axes of a file that does not state them (.pp, .csv, .txt, .asc) [LPS]",
             a.reading.axes);
   convert.add_flag("--leave-out-unknown", a.reading.leave_out_unknown,
-                   "leave out points whose name is not a site, and say which");
+                   "leave out points whose name is not a site, and list them");
   convert.add_flag("--force", a.force, "replace a file of the same name");
 }
 
-// What the user typed.
+// The arguments of `landmarks propose`.
 struct ProposeArguments {
   std::string skull, out, compare;
   std::vector<std::pair<std::string, std::string>> references;  // skull, landmarks
@@ -101,8 +101,8 @@ struct ProposeArguments {
   std::stop_token stop;
 };
 
-// Without a reference two made-up heads stand in.
-std::vector<ReferenceHead> ReferencesOf(const ProposeArguments& a) {
+// Without a given reference the references are two phantoms.
+std::vector<ReferenceHead> ReadReferences(const ProposeArguments& a) {
   std::vector<ReferenceHead> heads;
   for (const auto& [skull, landmarks] : a.references) {
     heads.push_back(ReadReference(skull, landmarks, a.threads));
@@ -110,32 +110,33 @@ std::vector<ReferenceHead> ReferencesOf(const ProposeArguments& a) {
   if (heads.empty()) {
     heads.push_back(PhantomReference(1));
     heads.push_back(PhantomReference(2));
-    fmt::print(stderr,
-               "note: without --reference made-up heads stand in, which have no orbits, arches or "
-               "teeth; a marked skull as --reference is much better\n");
+    fmt::print(
+        stderr,
+        "note: without --reference the references are phantoms, which have no orbits, arches or "
+        "teeth; a real skull with landmarks as --reference gives a much better proposal\n");
   }
   return heads;
 }
 
-void TellDifferences(const ProposeArguments& a, const LandmarkFile& file) {
+void PrintDifferences(const ProposeArguments& a, const LandmarkFile& file) {
   fmt::print("{}", FormatComparison(CompareProposal(InLpsMm(file), ReadLandmarks(a.compare).file)));
 }
 
 void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {
   const std::string bytes = EncodeLandmarks(file, out);
-  TellEach(LostIn(file, out), "not kept in this kind of file");
+  PrintEach(LostIn(file, out), "not kept in this kind of file");
   if (const fs::path folder = fs::path(out).parent_path(); !folder.empty()) {
     fs::create_directories(folder);
   }
   RefuseExisting(out, a.force);
   WriteFileAtomically(out, bytes);
   fmt::print(
-      "{}: {} sites proposed, {} absent, mm, {}. Look at each on the skull and correct it; then "
+      "{}: {} sites proposed, {} absent, mm, {}. Check each on the skull and correct it; then "
       "set `proposed: false`\n",
       out, file.landmarks.size(), file.absent.size(), AxesIn(file, out));
 }
 
-std::vector<fs::path> GivenTo(const ProposeArguments& a) {
+std::vector<fs::path> InputsOfProposal(const ProposeArguments& a) {
   std::vector<fs::path> given = {a.skull, a.compare};
   for (const auto& [skull, landmarks] : a.references) {
     given.insert(given.end(), {skull, landmarks});
@@ -149,18 +150,19 @@ int Propose(const ProposeArguments& a) {
                     : a.out;
   const bool writes = a.compare.empty() || !a.out.empty();
   if (writes) {
-    RefuseToReplace(out, GivenTo(a));
+    RefuseToReplace(out, InputsOfProposal(a));
     RefuseExisting(out, a.force);
   }
   RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};
   if (!a.quiet) {
     context.on_event = ProgressPrinter(stderr);
   }
-  const Proposal proposal = ProposeLandmarks(ReadMesh(a.skull), a.skull, ReferencesOf(a), context);
-  TellEach(proposal.notes, "note");
+  const Proposal proposal =
+      ProposeLandmarks(ReadMesh(a.skull), a.skull, ReadReferences(a), context);
+  PrintEach(proposal.notes, "note");
   const LandmarkFile file = ProposalFile(proposal, fs::path(a.skull).stem().string());
   if (!a.compare.empty()) {
-    TellDifferences(a, file);
+    PrintDifferences(a, file);
   }
   if (writes) {
     WriteProposal(a, out, file);
@@ -172,13 +174,15 @@ void DeclarePropose(CLI::App& propose, CommandLine& line) {
   ProposeArguments& a = *Bind(propose, line, &Propose);
   a.stop = line.stop;
   propose.add_option("SKULL", a.skull, "skull (.ply .obj .stl .off), mm, in any pose")->required();
-  propose.add_option("--reference", a.references,
-                     "SKULL LANDMARKS: a skull whose landmarks are known, mm; may be repeated: the "
-                     "median counts [two made-up heads]");
+  propose.add_option(
+      "--reference", a.references,
+      "SKULL LANDMARKS: a skull with known landmarks, mm; may be repeated, and the median "
+      "is used [two phantoms]");
   propose.add_option("--out", a.out, "file for the proposal [out/SKULL_proposed.yaml]");
-  propose.add_option("--compare", a.compare,
-                     "landmarks placed by hand: tells how far each site is off; without --out no "
-                     "file is written then");
+  propose.add_option(
+      "--compare", a.compare,
+      "landmarks placed by hand: prints the error of each site; writes no file unless "
+      "--out is given");
   propose.add_flag("--force", a.force, "replace a file of the same name");
   propose.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
       ->check(CLI::Range(1, 1024));
@@ -186,11 +190,10 @@ void DeclarePropose(CLI::App& propose, CommandLine& line) {
 }
 
 constexpr std::array kLandmarkCommands = {
-    ProgramCommand{"convert", "read landmarks of one program, write them for another",
-                   &DeclareConvert},
-    ProgramCommand{"page", "a page with each of the sites: names, place, tables, picture",
+    ProgramCommand{"convert", "convert landmarks from one program to another", &DeclareConvert},
+    ProgramCommand{"page", "write a page of all sites: names, definition, tables, picture",
                    &DeclarePage},
-    ProgramCommand{"propose", "propose the landmarks of a skull, as a file to correct",
+    ProgramCommand{"propose", "propose the landmarks of a skull in a file to correct",
                    &DeclarePropose},
 };
 
@@ -203,7 +206,7 @@ void DeclareLandmarks(CLI::App& landmarks, CommandLine& line) {
 
 std::span<const ProgramCommand> LandmarkCommands() {
   static constexpr std::array kCommands = {
-      ProgramCommand{"landmarks", "landmarks on a skull, from and for other programs",
+      ProgramCommand{"landmarks", "convert, propose and document landmarks on a skull",
                      &DeclareLandmarks},
   };
   return kCommands;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/phantom_commands.h"
+#include "problems/program/all_commands.h"
 
 #include <fmt/format.h>
 
@@ -26,10 +26,10 @@
 namespace semblance {
 namespace {
 
-// What the user typed.
+// The arguments of the command.
 struct PhantomArguments {
   std::string out;
-  std::string volume;  // the CT in one file too; empty: not
+  std::string volume;  // further file with the whole CT; empty: none
   PhantomOptions phantom;
   PhantomCtOptions ct;
   bool force = false;
@@ -45,9 +45,9 @@ void WriteSlices(const CtVolume& volume, std::uint64_t random_seed, OutputFolder
   }
 }
 
-// Nothing where no file is asked for.
-std::optional<VolumeFormat> FormatOfVolume(const std::string& name) {
-  constexpr std::array kWhole = {".nii", ".nii.gz", ".nrrd", ".mha"};  // voxels and all
+// Returns the format of --volume, or none if the name is empty. Throws InputError for a bad name.
+std::optional<VolumeFormat> CheckVolumeName(const std::string& name) {
+  constexpr std::array kWhole = {".nii", ".nii.gz", ".nrrd", ".mha"};  // one file with the voxels
   const bool is_whole =
       std::ranges::any_of(kWhole, [&](const char* e) { return name.ends_with(e); });
   if (!name.empty() && (!is_whole || name.find('/') != name.npos || name.starts_with('.'))) {
@@ -57,9 +57,9 @@ std::optional<VolumeFormat> FormatOfVolume(const std::string& name) {
   return VolumeFormatOf(name);
 }
 
-// Whole or not at all: written under another name, then renamed.
-void WriteOneFile(const CtVolume& volume, const std::string& name, VolumeFormat format,
-                  OutputFolder& folder) {
+// Writes under another name and renames the file, so that no incomplete file has the name.
+void WriteVolumeFile(const CtVolume& volume, const std::string& name, VolumeFormat format,
+                     OutputFolder& folder) {
   const std::filesystem::path part = folder.Root() / ("part-" + name);
   WriteImageVolume(volume, part, format);
   std::filesystem::rename(part, folder.Root() / name);
@@ -67,9 +67,10 @@ void WriteOneFile(const CtVolume& volume, const std::string& name, VolumeFormat 
 }
 
 int WritePhantom(const PhantomArguments& a) {
-  const std::optional<VolumeFormat> format = FormatOfVolume(a.volume);
+  const std::optional<VolumeFormat> format = CheckVolumeName(a.volume);
   const Phantom phantom = MakePhantom(a.phantom);
-  const LostBone lost(phantom, a.ct.defect);  // an unknown site is told before a folder is made
+  const LostBone lost(phantom,
+                      a.ct.defect);  // throws for an unknown site before the folder is made
   StagedFolder staged(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
   OutputFolder& folder = staged.Files();
   const CtVolume volume = VoxelisePhantom(phantom, a.ct);
@@ -87,7 +88,7 @@ int WritePhantom(const PhantomArguments& a) {
       volume.slices, volume.columns, volume.rows, a.ct.pixel_mm, a.ct.pixel_mm, a.ct.slice_mm,
       landmarks.landmarks.size(), phantom.face.triangles.size());
   if (format) {
-    WriteOneFile(volume, a.volume, *format, folder);
+    WriteVolumeFile(volume, a.volume, *format, folder);
   }
   staged.Publish();
   fmt::print("next: semblance import-ct {}\n", (staged.Root() / "ct").string());
@@ -99,30 +100,31 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
   a.ct.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   command.add_option("--out", a.out, "folder for ct/, landmarks.yaml and true_skin.ply")
       ->required();
-  command.add_option("--random-seed,--seed", a.phantom.random_seed, "which head")
+  command.add_option("--random-seed,--seed", a.phantom.random_seed, "number of the head")
       ->check(WholeNumber())
       ->capture_default_str();
-  AddChoice(command, "--bone", "smooth; like_people: with hollows and ridges, and rough",
+  AddChoice(command, "--bone", "smooth; like_people: rough, with hollows and ridges",
             a.phantom.bone);
-  command.add_option("--pixel-mm", a.ct.pixel_mm, "between columns and rows")
+  command.add_option("--pixel-mm", a.ct.pixel_mm, "distance of columns and of rows")
       ->check(Finite())
       ->check(CLI::Range(0.3, 5.0))
       ->capture_default_str();
-  command.add_option("--slice-mm", a.ct.slice_mm, "between slices")
+  command.add_option("--slice-mm", a.ct.slice_mm, "distance of slices")
       ->check(Finite())
       ->check(CLI::Range(0.3, 10.0))
       ->capture_default_str();
-  CLI::Option* const lost =
-      command.add_option("--lost", a.ct.defect.site,
-                         "the skull lacks its bone around this site; sites there are in no file");
-  command.add_option("--lost-radius-mm", a.ct.defect.radius_mm, "how far around it")
+  CLI::Option* const lost = command.add_option(
+      "--lost", a.ct.defect.site,
+      "remove the bone around this site; the landmark file omits the sites there");
+  command.add_option("--lost-radius-mm", a.ct.defect.radius_mm, "radius of the removed bone")
       ->needs(lost)
       ->check(Finite())
       ->check(CLI::Range(1.0, 60.0))
       ->capture_default_str();
-  command.add_option("--volume", a.volume,
-                     "the CT in one file too: NIfTI, NRRD or MetaImage by the name's ending, e.g. "
-                     "head.nii.gz");
+  command.add_option(
+      "--volume", a.volume,
+      "write the CT into one file too: NIfTI, NRRD or MetaImage by the ending of the "
+      "name, e.g. head.nii.gz");
   command.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");
 }
@@ -131,7 +133,7 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
 
 std::span<const ProgramCommand> PhantomCommands() {
   static constexpr std::array kCommands = {
-      ProgramCommand{"phantom", "write a made-up head as a CT in DICOM, with its landmarks",
+      ProgramCommand{"phantom", "write a phantom head as a CT in DICOM, with its landmarks",
                      &DeclarePhantom},
   };
   return kCommands;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/population_command.h"
+#include "problems/program/all_commands.h"
 
 #include <fmt/format.h>
 
@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the user typed.
+// The arguments of the command.
 struct PopulationArguments {
   std::string path, out, shard;
   std::vector<std::string> from;
@@ -34,14 +34,14 @@ struct PopulationArguments {
   std::stop_token stop;
 };
 
-void TellNotes(const std::vector<std::string>& notes) {
+void PrintNoteLines(const std::vector<std::string>& notes) {
   for (const std::string& note : notes) {
     Tell("note: {}\n", note);
   }
 }
 
 int PrintPlan(const PopulationPlan& plan) {
-  TellNotes(plan.notes);
+  PrintNoteLines(plan.notes);
   for (const PopulationEntry& entry : plan.entries) {
     Tell("{} {}\n", entry.id, entry.subject.name);
   }
@@ -49,8 +49,8 @@ int PrintPlan(const PopulationPlan& plan) {
   return kDone;
 }
 
-PopulationRunSummary MeasureTold(const PopulationPlan& plan, const fs::path& root,
-                                 const PopulationArguments& a) {
+PopulationRunSummary MeasureWithProgress(const PopulationPlan& plan, const fs::path& root,
+                                         const PopulationArguments& a) {
   PopulationRunOptions options = a.run;
   const Shard shard = ShardOf(a.shard);
   options.shard = shard.index;
@@ -66,15 +66,15 @@ PopulationRunSummary MeasureTold(const PopulationPlan& plan, const fs::path& roo
   return MeasurePopulation(plan, root, options, context);
 }
 
-void TellGathered(const std::vector<GatheredFrom>& gathered, const PopulationPlan& plan) {
+void PrintGathered(const std::vector<GatheredFrom>& gathered, const PopulationPlan& plan) {
   for (const GatheredFrom& from : gathered) {
     Tell("from {}: {} taken; it has {} of the {} subjects\n", from.folder.string(), from.taken,
          from.held, plan.entries.size());
   }
 }
 
-// Why subjects have no depths. Returns how many were not measured.
-int TellFailures(const std::vector<MeasuredSubject>& subjects) {
+// Prints why subjects have no depths, and returns their number.
+int PrintFailures(const std::vector<MeasuredSubject>& subjects) {
   int failures = 0;
   for (const MeasuredSubject& subject : subjects) {
     if (subject.status != "done") {
@@ -86,8 +86,8 @@ int TellFailures(const std::vector<MeasuredSubject>& subjects) {
   return failures;
 }
 
-// The plan with the shard's subjects alone.
-PopulationPlan PartOf(const PopulationPlan& plan, const Shard& shard) {
+// The plan with only the subjects of the shard.
+PopulationPlan SelectShard(const PopulationPlan& plan, const Shard& shard) {
   PopulationPlan part = plan;
   part.entries.clear();
   for (std::size_t n = 0; n < plan.entries.size(); ++n) {
@@ -98,38 +98,38 @@ PopulationPlan PartOf(const PopulationPlan& plan, const Shard& shard) {
   return part;
 }
 
-// Failures are those of all the shard's subjects, also of an earlier call.
-int TellPart(const PopulationRunSummary& summary, const PopulationPlan& part,
-             const fs::path& root) {
-  TellNotes(part.notes);
-  const int failures = TellFailures(ReadMeasured(part, root));
+// Prints the state of a shard. Failures of earlier calls are printed too.
+int PrintShardState(const PopulationRunSummary& summary, const PopulationPlan& part,
+                    const fs::path& root) {
+  PrintNoteLines(part.notes);
+  const int failures = PrintFailures(ReadMeasured(part, root));
   Tell(
-      "shard: {} subjects, {} already there, {} done, {} failed; once all shards have run, the "
+      "shard: {} subjects, {} measured before, {} done, {} failed; when all shards have run, the "
       "same call without --shard makes the table\n",
       summary.subjects, summary.skipped, summary.done, summary.failed);
   return failures == 0 ? kDone : kNotUsable;
 }
 
-// What was made of fewer stays as it was.
-int TellNoTable(const std::string& why, const std::vector<std::string>& notes,
-                const fs::path& root) {
-  TellNotes(notes);
+// Prints why there is no table. Results of an earlier call stay in the folder.
+int PrintNoTable(const std::string& why, const std::vector<std::string>& notes,
+                 const fs::path& root) {
+  PrintNoteLines(notes);
   Tell("no table: {}\nsubjects: {}\n", why, (root / "subjects.csv").string());
   if (fs::exists(root / "table.yaml")) {
-    Tell("note: table.yaml and the other results there are of an earlier call\n");
+    Tell("note: table.yaml and the other results in the folder belong to an earlier call\n");
   }
   return kNotUsable;
 }
 
-int TellResult(const PopulationResult& result, const fs::path& root) {
-  TellNotes(result.notes);
+int PrintResult(const PopulationResult& result, const fs::path& root) {
+  PrintNoteLines(result.notes);
   Tell("{}", PopulationText(result));
   Tell("table: {}\nreport: {}\n", (root / "table.yaml").string(), (root / "report.html").string());
   return result.Count("done") == static_cast<int>(result.subjects.size()) ? kDone : kNotUsable;
 }
 
-// What is read, and what may be written.
-GivenFiles GivenTo(const PopulationArguments& a, const PopulationPlan& plan) {
+// The files that are read, and those that may be written.
+GivenFiles ListFiles(const PopulationArguments& a, const PopulationPlan& plan) {
   GivenFiles given{.files = {a.path}, .outputs = kPopulationFiles};
   if (fs::is_directory(a.path)) {
     given.files.push_back(fs::path(a.path) / "subjects.csv");
@@ -147,26 +147,26 @@ int PopulationCommand(const PopulationArguments& a) {
   }
   const std::string name = PlainName(a.path);
   const fs::path root = a.out.empty() ? fs::path("out") / name : fs::path(a.out);
-  RefuseToReplace(root, GivenTo(a, plan));
+  RefuseToReplace(root, ListFiles(a, plan));
   if (!a.force) {
     RefuseOtherFolder(plan, root);
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
-  TellGathered(GatherSubjects(plan, root, {a.from.begin(), a.from.end()}), plan);
-  const PopulationRunSummary summary = MeasureTold(plan, root, a);
+  PrintGathered(GatherSubjects(plan, root, {a.from.begin(), a.from.end()}), plan);
+  const PopulationRunSummary summary = MeasureWithProgress(plan, root, a);
   if (const Shard shard = ShardOf(a.shard); shard.count > 1) {
-    return TellPart(summary, PartOf(plan, shard), root);
+    return PrintShardState(summary, SelectShard(plan, shard), root);
   }
   const fs::path whole = fs::absolute(root).lexically_normal();
   const std::vector<MeasuredSubject> measured = ReadMeasured(plan, root);
-  TellFailures(measured);
+  PrintFailures(measured);
   if (const std::string why = WhyNoTable(plan, measured); !why.empty()) {
     WriteSubjects(measured, folder);
-    return TellNoTable(why, plan.notes, whole);
+    return PrintNoTable(why, plan.notes, whole);
   }
   const PopulationResult result = AnalysePopulation(plan, measured);
   WritePopulation(result, folder);
-  return TellResult(result, whole);
+  return PrintResult(result, whole);
 }
 
 void DeclarePopulation(CLI::App& command, CommandLine& line) {
@@ -176,16 +176,17 @@ void DeclarePopulation(CLI::App& command, CommandLine& line) {
       .add_option("PATH", a.path,
                   "folder with a folder for each subject, or a YAML file (options population)")
       ->required();
-  command.add_option("--out", a.out, "folder for what comes of it; a population there goes on");
+  command.add_option("--out", a.out, "folder for the results; a population in it is continued");
   command.add_option("--jobs", a.run.jobs, "subjects at a time")->check(CLI::Range(1, 1024));
-  command.add_option("--threads", a.threads, "processors to use")->check(CLI::Range(1, 1024));
+  command.add_option("--threads", a.threads, "threads to use")->check(CLI::Range(1, 1024));
   command.add_option("--shard", a.shard,
-                     "I/N: measures only every N-th subject from the I-th (from 0)");
-  command.add_option("--from", a.from, "folders of other shards to take measured subjects from");
+                     "I/N: measure only every N-th subject, beginning with the I-th (from 0)");
+  command.add_option("--from", a.from,
+                     "folders of other shards whose measured subjects are copied");
   command.add_flag("--list", a.list, "print the subjects and measure nothing");
   command.add_flag("--force", a.force,
-                   "replace files of the same name in a folder that holds something else");
-  command.add_flag("--rerun-failed", a.run.rerun_failed, "measure again what failed");
+                   "replace files of the same name in a folder with other contents");
+  command.add_flag("--rerun-failed", a.run.rerun_failed, "measure failed subjects again");
   command.add_flag("--quiet", a.quiet, "no progress");
 }
 
@@ -193,9 +194,10 @@ void DeclarePopulation(CLI::App& command, CommandLine& line) {
 
 std::span<const ProgramCommand> PopulationCommands() {
   static constexpr std::array kCommands = {
-      ProgramCommand{"population",
-                     "make a tissue table with correlations, and modes of depth, of many subjects",
-                     &DeclarePopulation},
+      ProgramCommand{
+          "population",
+          "make a tissue table with correlations, and modes of depth, from many subjects",
+          &DeclarePopulation},
   };
   return kCommands;
 }

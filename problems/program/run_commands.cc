@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/run_commands.h"
+#include "problems/program/all_commands.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -29,7 +29,7 @@
 #include "problems/points/point_fit.h"
 #include "problems/population/population_file.h"
 #include "problems/program/evaluate.h"
-#include "problems/program/failure.h"
+#include "problems/program/program_end.h"
 #include "problems/program/work_options.h"
 #include "problems/report/alternatives.h"
 #include "problems/report/run_folder.h"
@@ -45,7 +45,7 @@
 namespace semblance {
 namespace {
 
-// What the user typed; each command reads its part.
+// The arguments of all commands of this file. Each command reads its part.
 struct Arguments : WorkOptions {
   std::vector<std::string> files;
   bool schema = false, without_inputs = false;
@@ -72,21 +72,21 @@ void PrintNotes(const std::vector<std::string>& notes) {
   }
 }
 
-// The alternatives of an experiment that was read from the file.
-std::vector<NamedExperiment> AlternativesIn(const std::filesystem::path& file,
-                                            const Arguments& arguments,
-                                            const Experiment& experiment) {
+// Reads the alternatives of the experiment in the file.
+std::vector<NamedExperiment> ReadAlternatives(const std::filesystem::path& file,
+                                              const Arguments& arguments,
+                                              const Experiment& experiment) {
   ConfigErrors errors;
   const ConfigNode tree =
       LoadConfigTree(file, arguments.overrides, ConfigTreeOf(Experiment{}), errors);
   return AlternativesOf(experiment, file.parent_path(), tree);
 }
 
-// What an alternative would be refused for ends the run before the long work, not after it. What
-// is wrong with the experiment itself the run will say.
-void RefuseFaultyAlternatives(const std::filesystem::path& config, const Experiment& experiment,
-                       const std::vector<NamedExperiment>& named, StageCache& cache,
-                       const RunContext& context) {
+// Throws InputError for faults of the alternatives before the long work begins. The run itself
+// reports faults of the experiment.
+void RequireSoundAlternatives(const std::filesystem::path& config, const Experiment& experiment,
+                              const std::vector<NamedExperiment>& named, StageCache& cache,
+                              const RunContext& context) {
   if (named.empty()) {
     return;
   }
@@ -105,15 +105,16 @@ int RunCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   CheckNetworkNamed(experiment, config);
-  const std::vector<NamedExperiment> named = AlternativesIn(config, arguments, experiment);
+  const std::vector<NamedExperiment> named = ReadAlternatives(config, arguments, experiment);
   GivenFiles given = GivenTo(experiment, config, kRunFiles);
   for (const NamedExperiment& alternative : named) {
     std::ranges::copy(InputFilesOf(alternative.experiment), std::back_inserter(given.files));
   }
-  StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string(), std::move(given));
-  const RunContext context = ContextOf(arguments);
+  StagedFolder folder =
+      MakeStagedFolder(arguments, "out/" + config.stem().string(), std::move(given));
+  const RunContext context = MakeRunContext(arguments);
   StageCache cache(16);
-  RefuseFaultyAlternatives(config, experiment, named, cache, context);
+  RequireSoundAlternatives(config, experiment, named, cache, context);
   const RunResult result = Run(experiment, context, &cache);
   std::vector<std::string> faults = result.Faults();
   std::ranges::copy(RunAlternatives(experiment, named, result, cache, folder.Files(), context),
@@ -123,43 +124,44 @@ int RunCommand(const Arguments& arguments) {
   PrintNotes(result.Notes());
   if (result.truth) {
     fmt::print("{}; closest-point distances\n", InWords(result.truth->skin));
-    PrintFaceError("implicit face", result.truth->implicit);
-    PrintFaceError("H-spline face", result.truth->face);
+    PrintFaceError("first face", result.truth->implicit);
+    PrintFaceError("recovered face", result.truth->face);
   }
   fmt::print("report: {}\n", (folder.Root() / "report.html").string());
-  return TellFaults(faults);
+  return PrintFaults(faults);
 }
 
 int DepthCommand(const Arguments& arguments) {
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   CheckNetworkNamed(experiment, config);
-  StagedFolder folder = FolderOf(arguments, "out/" + config.stem().string() + "_depth",
-                                 GivenTo(experiment, config, kDepthFiles));
-  const RunContext context = ContextOf(arguments);
+  StagedFolder folder = MakeStagedFolder(arguments, "out/" + config.stem().string() + "_depth",
+                                         GivenTo(experiment, config, kDepthFiles));
+  const RunContext context = MakeRunContext(arguments);
   const DepthResult result = MeasureDepth(experiment, context);
   WriteDepth(experiment, result, folder.Files(), context);
   folder.Publish();
   PrintNotes(result.stage->subject.notes);
   fmt::print("{}folder: {}\n", DepthText(result), folder.Root().string());
-  return TellFaults(result.Faults());
+  return PrintFaults(result.Faults());
 }
 
-// Each file that is named and not there, where it is named. Template and bust are read with the
-// options, which depend on them, and are told there.
+// Adds an error for each missing file, at the place of its name. Files of template and bust are
+// read together with the options and reported there.
 void AddMissing(std::span<const NamedFile> named, const ConfigNode& tree, ConfigErrors& errors) {
   std::error_code ignored;
   for (const NamedFile& input : named) {
-    const bool is_told = input.option.starts_with("template.") || input.option.starts_with("bust.");
-    if (!is_told && !std::filesystem::exists(input.file, ignored)) {
+    const bool is_reported =
+        input.option.starts_with("template.") || input.option.starts_with("bust.");
+    if (!is_reported && !std::filesystem::exists(input.file, ignored)) {
       errors.Add(LocationOf(tree, input.option), input.option,
-                 fmt::format("no such file: {}; paths are relative to the file that they stand in",
+                 fmt::format("no such file: {}; paths are relative to the file that names them",
                              input.file.string()));
     }
   }
 }
 
-// A configuration with its faults all at once, files that are missing among them.
+// Reads a configuration. Throws ConfigError with all its faults, missing files included.
 template <class Options>
 Options ReadChecked(const std::string& file, const Arguments& arguments,
                     std::vector<NamedFile> (*inputs_of)(const Options&)) {
@@ -193,7 +195,7 @@ CheckFindings CheckStudy(const std::string& file, const Arguments& arguments, In
 CheckFindings CheckExperiment(const std::string& file, const Arguments& arguments,
                               InputCheck& inputs) {
   const auto experiment = ReadChecked<Experiment>(file, arguments, &NamedInputsOf);
-  const std::vector<NamedExperiment> named = AlternativesIn(file, arguments, experiment);
+  const std::vector<NamedExperiment> named = ReadAlternatives(file, arguments, experiment);
   CheckFindings findings;
   if (!arguments.without_inputs) {
     findings = inputs.Look(experiment);
@@ -215,7 +217,7 @@ CheckFindings CheckPopulation(const std::string& file, const Arguments& argument
   return findings;
 }
 
-// Whether the file is one of such options, whatever files it names.
+// True if the file can be read as such options. Files that it names are not opened.
 template <class Options>
 bool Reads(const std::string& file, const Arguments& arguments) try {
   ConfigErrors errors;
@@ -227,8 +229,10 @@ bool Reads(const std::string& file, const Arguments& arguments) try {
   return false;
 }
 
-// Of a file that is a fit's: what is wrong with it as an experiment is a warning.
-CheckFindings CheckEither(const std::string& file, const Arguments& arguments, InputCheck& inputs) {
+// Checks a file that is a sound configuration of a fit and may be an experiment too. Faults of the
+// experiment are warnings.
+CheckFindings CheckFitOrExperiment(const std::string& file, const Arguments& arguments,
+                                   InputCheck& inputs) {
   CheckFindings findings;
   try {
     findings = CheckExperiment(file, arguments, inputs);
@@ -236,14 +240,14 @@ CheckFindings CheckEither(const std::string& file, const Arguments& arguments, I
     findings.faults.emplace_back(error.what());
   }
   for (const std::string& fault : std::exchange(findings.faults, {})) {
-    findings.warnings.push_back("it is one for `semblance fit`; `semblance run` would say: " +
-                                fault);
+    findings.warnings.push_back(
+        "it is a configuration of `semblance fit`; `semblance run` would report: " + fault);
   }
   return findings;
 }
 
-// The keys at the top tell what a file is for: an experiment, where no other fits better. With
-// keys alone that experiments and fits both have, it may be either.
+// Finds the kind of file by its top-level keys. It is an experiment unless another kind has more of
+// the keys. A file whose keys all belong to experiments and to fits may be either.
 CheckFindings CheckConfig(const std::string& file, const Arguments& arguments, InputCheck& inputs) {
   const int of_study = OwnKeys<StudyFile>(file), of_population = OwnKeys<PopulationFile>(file);
   if (of_study > OwnKeys<Experiment>(file) && of_study >= of_population) {
@@ -257,13 +261,13 @@ CheckFindings CheckConfig(const std::string& file, const Arguments& arguments, I
     return {};
   }
   if (Reads<PointFitOptions>(file, arguments)) {
-    return CheckEither(file, arguments, inputs);
+    return CheckFitOrExperiment(file, arguments, inputs);
   }
   return CheckExperiment(file, arguments, inputs);
 }
 
-// Returns whether there was no fault.
-bool TellFindings(const std::string& file, const CheckFindings& findings) {
+// Prints the findings and returns true if there was no fault.
+bool PrintFindings(const std::string& file, const CheckFindings& findings) {
   for (const std::string& warning : findings.warnings) {
     fmt::print("{}: warning: {}\n", file, warning);
   }
@@ -276,9 +280,9 @@ bool TellFindings(const std::string& file, const CheckFindings& findings) {
   return findings.sound();
 }
 
-// Faults of a configuration stand with their places; all else with the file that was looked at.
-std::string FaultOf(const std::string& file, const std::exception_ptr& thrown) {
-  const std::string words = FailureOf(thrown).words;
+// The message of an exception. The name of the file is added if the message does not begin with it.
+std::string DescribeFault(const std::string& file, const std::exception_ptr& thrown) {
+  const std::string words = DescribeFailure(thrown).words;
   return words.starts_with(file) ? words : Shortened(fmt::format("{}: {}", file, words));
 }
 
@@ -289,12 +293,12 @@ int CheckCommand(const Arguments& arguments) {
   bool sound = true;
   for (const std::string& file : arguments.files) {
     try {
-      sound = TellFindings(file, CheckConfig(file, arguments, inputs)) && sound;
+      sound = PrintFindings(file, CheckConfig(file, arguments, inputs)) && sound;
     } catch (const ConfigError& error) {
       fmt::print(stderr, "{}\n", Shortened(error.what()));
       sound = false;
     } catch (...) {
-      fmt::print(stderr, "{}\n", FaultOf(file, std::current_exception()));
+      fmt::print(stderr, "{}\n", DescribeFault(file, std::current_exception()));
       sound = false;
     }
   }
@@ -315,12 +319,11 @@ int OptionsCommand(const Arguments& arguments) {
   return kDone;
 }
 
-// Checked as whoever reads it will.
+// Checks the mesh as its readers do, and writes it.
 void WriteSkin(const TriMesh& skin, int dropped, OutputFolder& folder) {
   CheckHeadMesh(skin, "the imported skin");
   folder.Write("skin.ply", EncodeMesh(skin, ".ply"));
-  fmt::print("skin.ply: {} triangles; {} pieces apart from the largest dropped\n",
-             skin.triangles.size(), dropped);
+  fmt::print("skin.ply: {} triangles; {} smaller pieces dropped\n", skin.triangles.size(), dropped);
 }
 
 void WriteImport(const CtImport& import, OutputFolder& folder) {
@@ -336,7 +339,7 @@ bool IsMr(const Arguments& arguments, const VolumeReading& reading) {
                                       : arguments.modality == "mr";
 }
 
-// Writes the meshes; what is wrong with them is said with the volume's name.
+// Writes the meshes. Messages about faults begin with the name of the volume.
 void Import(const Arguments& arguments, const VolumeReading& reading, bool mr, OutputFolder& folder,
             const RunContext& context) try {
   if (mr) {
@@ -352,14 +355,14 @@ void Import(const Arguments& arguments, const VolumeReading& reading, bool mr, O
 
 int ImportCtCommand(const Arguments& arguments) {
   const std::filesystem::path path = arguments.files.at(0);
-  const RunContext context = ContextOf(arguments);
+  const RunContext context = MakeRunContext(arguments);
   const VolumeReading reading = ReadVolume(path, arguments.reading, context);
   const bool mr = IsMr(arguments, reading);
   if (!mr && arguments.mr.skin_value > 0) {
-    throw InputError("--skin-value is for an MR; the skin of a CT is at --skin-hu");
+    throw InputError("--skin-value is for an MR; use --skin-hu for a CT");
   }
   PrintNotes(reading.notes);
-  StagedFolder folder = FolderOf(arguments, "out/" + PlainName(path), {.files = {path}});
+  StagedFolder folder = MakeStagedFolder(arguments, "out/" + PlainName(path), {.files = {path}});
   Import(arguments, reading, mr, folder.Files(), context);
   folder.Publish();
   const std::filesystem::path root = std::filesystem::absolute(folder.Root()).lexically_normal();
@@ -381,11 +384,11 @@ int EvaluateCommand(const Arguments& arguments) {
                           .landmarks = arguments.landmarks,
                           .exclude = {}};
   std::ranges::transform(arguments.exclude, std::back_inserter(options.exclude), ParseZone);
-  const nlohmann::ordered_json score = Evaluate(options, ContextOf(arguments));
+  const nlohmann::ordered_json score = Evaluate(options, MakeRunContext(arguments));
   fmt::print("{}\n", score.dump(2));
-  return TellFaults(std::isfinite(score.at("rms_mm").get<double>())
-                        ? std::vector<std::string>()
-                        : std::vector<std::string>{"the distance of the faces is not a number"});
+  return PrintFaults(std::isfinite(score.at("rms_mm").get<double>())
+                         ? std::vector<std::string>()
+                         : std::vector<std::string>{"the distance of the faces is not a number"});
 }
 
 int ReportCommand(const Arguments& arguments) {
@@ -414,7 +417,7 @@ int ReportCommand(const Arguments& arguments) {
 
 using CommandFunction = int (*)(const Arguments&);
 
-// A command that reads a configuration and writes a folder.
+// Declares a command that reads a configuration and writes a folder.
 Arguments& DeclareJob(CLI::App& command, CommandLine& line, CommandFunction run) {
   Arguments& a = *Bind(command, line, run);
   AddSet(command, a);
@@ -441,17 +444,17 @@ void DeclareImportCt(CLI::App& command, CommandLine& line) {
       ->required()
       ->expected(1);
   command.add_option("--series", a.reading.series,
-                     "of a DICOM folder: number or UID of the series, where there are several");
+                     "number or UID of the series, if a DICOM folder holds several");
   command.add_flag("--fill-slices", a.reading.fill_slices,
-                   "interpolate missing slices (over up to 10 mm), take the first of doubled ones");
+                   "interpolate missing slices (over up to 10 mm), use the first of duplicates");
   command
       .add_option("--modality", a.modality,
-                  "ct, or mr, of which the skin alone is taken; auto: as DICOM says, else ct")
+                  "ct; mr: only the skin is imported; auto: as DICOM states, else ct")
       ->check(CLI::IsMember({"auto", "ct", "mr"}))
       ->capture_default_str();
   command
       .add_option("--skin-value", a.mr.skin_value,
-                  "of an MR: grey value of the skin's surface; 0 finds it by Otsu's method")
+                  "MR only: grey value of the skin's surface; 0: by Otsu's method")
       ->check(Finite())
       ->check(CLI::Range(0.0, 32767.0))
       ->capture_default_str();
@@ -463,7 +466,7 @@ void DeclareImportCt(CLI::App& command, CommandLine& line) {
       ->check(Finite())
       ->check(CLI::Range(-900.0, 0.0))
       ->capture_default_str();
-  AddChoice(command, "--edges", "threshold, or half_maximum, which thins tissue less", a.ct.edges);
+  AddChoice(command, "--edges", "threshold; half_maximum: keeps more of thin tissue", a.ct.edges);
   AddOutput(command, a);
   AddWork(command, line, a);
 }
@@ -473,14 +476,13 @@ void DeclareCheck(CLI::App& command, CommandLine& line) {
   command.add_option("CONFIG", a.files, "YAML files")->required();
   AddSet(command, a);
   command.add_flag("--without-inputs", a.without_inputs,
-                   "look at the options alone; else every file that they name is opened, and the "
-                   "landmarks are laid on the bone");
+                   "check only the options; otherwise every file that they name is opened, and the "
+                   "landmarks are placed on the bone");
 }
 
 void DeclareOptions(CLI::App& command, CommandLine& line) {
   Arguments& a = *Bind(command, line, &OptionsCommand);
-  command
-      .add_option("KIND", a.options_of, "the kind of file: experiment, study, population or fit")
+  command.add_option("KIND", a.options_of, "kind of file: experiment, study, population or fit")
       ->check(CLI::IsMember({"experiment", "study", "population", "fit"}))
       ->capture_default_str();
   command.add_flag("--schema", a.schema, "as a JSON Schema for editors");
@@ -494,17 +496,18 @@ void DeclareEvaluate(CLI::App& command, CommandLine& line) {
                   "the true skin")
       ->required()
       ->expected(1, 2);
-  command.add_option("--config", a.config,
-                     "experiment whose true skin, landmarks and region are taken; without TRUTH, "
-                     "its figures are the run's to the bit");
+  command.add_option(
+      "--config", a.config,
+      "experiment with true skin, landmarks and region; without TRUTH, the numbers are "
+      "identical to those of its run");
   AddSet(command, a);
   command.add_option(
       "--landmarks", a.landmarks,
       "YAML file of the landmarks on the true skull: only the outer skin of the face "
-      "is scored; without it all of TRUTH");
+      "is scored; without it the whole TRUTH");
   command
       .add_option("--exclude", a.exclude,
-                  "site=radius_mm, e.g. zy_r=15: a zone that is not scored; may be repeated")
+                  "site=radius_mm, e.g. zy_r=15: zone that is not scored; may be repeated")
       ->allow_extra_args(false);
   AddWork(command, line, a);
 }
@@ -518,10 +521,12 @@ void DeclareReport(CLI::App& command, CommandLine& line) {
 
 std::span<const ProgramCommand> RunCommands() {
   static constexpr std::array kCommands = {
-      ProgramCommand{"run", "reconstruct a face as a configuration says", &DeclareRun},
-      ProgramCommand{"depth",
-                     "interpolate depth alone: against the true skin, and with dowels left out",
-                     &DeclareDepth},
+      ProgramCommand{"run", "recover the face of a configuration", &DeclareRun},
+      ProgramCommand{
+          "depth",
+          "interpolate only the depth, and compare it with the true skin and with left-out depth "
+          "markers",
+          &DeclareDepth},
       ProgramCommand{
           "import-ct",
           "make meshes of skull and skin from a CT volume, or of the skin from an MR, in "
@@ -529,14 +534,14 @@ std::span<const ProgramCommand> RunCommands() {
           &DeclareImportCt},
       ProgramCommand{
           "check",
-          "check configurations of experiments, studies and fits, and all inputs that they "
+          "check configurations of experiments, studies and fits, and all files that they "
           "name; run nothing",
           &DeclareCheck},
       ProgramCommand{"options", "list every option: default, unit, range, meaning",
                      &DeclareOptions},
-      ProgramCommand{"evaluate", "measure how far a face is from the true one, as JSON",
+      ProgramCommand{"evaluate", "print the distances of a face from the true one as JSON",
                      &DeclareEvaluate},
-      ProgramCommand{"report", "build the report of a run or a study anew", &DeclareReport},
+      ProgramCommand{"report", "build the report of a run or a study again", &DeclareReport},
   };
   return kCommands;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/study_commands.h"
+#include "problems/program/all_commands.h"
 
 #include <fmt/format.h>
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/template_commands.h"
+#include "problems/program/all_commands.h"
 
 #include <fmt/format.h>
 
@@ -34,7 +34,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the user typed.
+// The arguments of `template`.
 struct TemplateArguments : WorkOptions {
   fs::path input;
   std::vector<fs::path> landmarks;
@@ -42,13 +42,14 @@ struct TemplateArguments : WorkOptions {
   bool bust = false;
 };
 
-// What is written, at most.
+// All files that may be written.
 constexpr std::array<std::string_view, 6> kOutputs = {"head.hspline.json", "sites.csv",
                                                       "features.json",     "template.json",
                                                       "template.png",      "bust.json"};
 
 StagedFolder MakeFolder(const TemplateArguments& a, GivenFiles given) {
-  return FolderOf(a, fmt::format("out/{}_template", a.input.stem().string()), std::move(given));
+  return MakeStagedFolder(a, fmt::format("out/{}_template", a.input.stem().string()),
+                          std::move(given));
 }
 
 void Write(const TemplateFace& face, StagedFolder& folder) {
@@ -61,10 +62,10 @@ void Write(const TemplateFace& face, StagedFolder& folder) {
              name(files.surface), name(files.sites), name(files.features));
 }
 
-// The generic face that a configuration asks for.
-int FromConfig(const TemplateArguments& a) {
+// Writes the template of a configuration.
+int WriteFromConfig(const TemplateArguments& a) {
   if (a.bust) {
-    throw InputError("--bust is for a head with landmarks; a configuration has no mesh of one");
+    throw InputError("--bust needs a head with landmarks; leave it out for a configuration");
   }
   const auto experiment = ReadConfig<Experiment>(a.input, a.overrides);
   StagedFolder folder = MakeFolder(a, GivenTo(experiment, a.input, kOutputs));
@@ -72,14 +73,15 @@ int FromConfig(const TemplateArguments& a) {
   return kDone;
 }
 
-// One from a head. All that can be wrong with it is known before the folder is made.
-int FromHead(const TemplateArguments& a) {
+// Makes a template from a head. All faults of the input are found before the folder is made.
+int MakeFromHead(const TemplateArguments& a) {
   if (!a.overrides.empty()) {
-    throw InputError("--set is for a configuration; a head takes --finest and --tolerance_mm");
+    throw InputError(
+        "--set is for a configuration; the options of a head are --finest and --tolerance_mm");
   }
   GivenFiles given{.files = a.landmarks, .outputs = kOutputs};
   given.files.push_back(a.input);
-  const RunContext context = ContextOf(a);
+  const RunContext context = MakeRunContext(a);
   const TriMesh mesh = ReadMesh(a.input);
   const OuterHead head =
       PrepareHead(mesh, ReadSkinLandmarks(a.landmarks), a.input.string(), context);
@@ -106,7 +108,7 @@ int FromHead(const TemplateArguments& a) {
 }
 
 int Template(const TemplateArguments& a) {
-  return a.landmarks.empty() ? FromConfig(a) : FromHead(a);
+  return a.landmarks.empty() ? WriteFromConfig(a) : MakeFromHead(a);
 }
 
 void DeclareTemplate(CLI::App& command, CommandLine& line) {
@@ -114,14 +116,15 @@ void DeclareTemplate(CLI::App& command, CommandLine& line) {
   command
       .add_option("MESH", a.input,
                   "head (.ply .obj .stl .off), LPS in mm; or, without LANDMARKS, YAML file of an "
-                  "experiment, whose generic face is written")
+                  "experiment, whose template is written")
       ->required();
-  command.add_option("LANDMARKS", a.landmarks,
-                     "points on its skin (.csv: site,x,y,z or i_multipie,x,y,z), or those of its "
-                     "skull with depths (.yaml); one file or more");
+  command.add_option(
+      "LANDMARKS", a.landmarks,
+      "points on its skin (.csv: site,x,y,z or i_multipie,x,y,z), or on its skull with "
+      "depths (.yaml); one file or more");
   command
       .add_option("--tolerance_mm", a.fit.tolerance_mm,
-                  "root mean square distance from the skin, over the face, that ends the fit")
+                  "the fit ends at this root mean square distance from the skin, over the face")
       ->check(Finite())
       ->check(CLI::Range(1e-3, 10.0))
       ->capture_default_str();
@@ -130,9 +133,9 @@ void DeclareTemplate(CLI::App& command, CommandLine& line) {
       ->capture_default_str();
   AddSet(command, a);
   command.add_flag("--bust", a.bust,
-                   "write bust.json too: the whole head, ears and neck, which `bust: {type: "
-                   "hspline, file: bust.json}` takes; the mesh must be one piece, open at the "
-                   "neck alone but for eyes and mouth");
+                   "write bust.json too: the whole head with ears and neck, for `bust: {type: "
+                   "hspline, file: bust.json}`; the mesh must be one piece, open only at neck, "
+                   "eyes and mouth");
   AddOutput(command, a);
   AddWork(command, line, a);
 }
@@ -155,19 +158,20 @@ Experiment ReadKnown(const fs::path& config, const RecentreArguments& a) {
   auto experiment = ReadConfig<Experiment>(config, a.overrides);
   if (experiment.tissue.depths != DepthSource::kMeasured) {
     throw InputError(
-        fmt::format("{}: depths of a table; to learn of a head its depths must be "
-                    "measured (tissue: {{depths: measured}})",
+        fmt::format("{}: its depths come from a table; recentring needs measured depths (tissue: "
+                    "{{depths: measured}})",
                     config.string()));
   }
   return experiment;
 }
 
-// The skin that is scored.
+// The dowels of a head and the scored part of its skin.
 KnownHead ReadHead(const fs::path& config, const RecentreArguments& a, const RunContext& context) {
   const Experiment experiment = ReadKnown(config, a);
   const Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment);
   if (!subject.skin) {
-    throw InputError(fmt::format("{}: the head has no skin to learn from", config.string()));
+    throw InputError(
+        fmt::format("{}: the head has no skin, which recentring needs", config.string()));
   }
   const ScoredSkin scored = FindScoredSkin(subject, experiment.region);
   std::vector<bool> keep;
@@ -177,7 +181,7 @@ KnownHead ReadHead(const fs::path& config, const RecentreArguments& a, const Run
   return {.dowels = subject.dowels_on_bone, .skin = Submesh(*subject.skin, keep)};
 }
 
-GivenFiles GivenTo(const RecentreArguments& a) {
+GivenFiles ListInputs(const RecentreArguments& a) {
   GivenFiles given{.files = a.heads, .outputs = kOutputs};
   for (const fs::path& config : a.heads) {
     std::ranges::copy(InputFilesOf(ReadKnown(config, a)), std::back_inserter(given.files));
@@ -196,7 +200,7 @@ int RecentreCommand(const RecentreArguments& a) {
     heads.push_back(ReadHead(config, a, context));
   }
   StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse,
-                      GivenTo(a));
+                      ListInputs(a));
   const Recentred result = Recentre(prior, on_template, face, heads, a.options, context);
   fmt::print(
       "{} heads: sites moved by {:.1f} mm in the median, the mean by {:.2f} mm RMS, at most "
@@ -211,26 +215,26 @@ void DeclareRecentre(CLI::App& command, CommandLine& line) {
   a.stop = line.stop;
   command
       .add_option("CONFIG", a.heads,
-                  "experiments (.yaml) of heads with skin and measured depths; template and prior "
-                  "are those of the first")
+                  "experiments (.yaml) of heads with skin and measured depths; the first one gives "
+                  "template and prior")
       ->required();
-  command.add_option("--out", a.out, "folder for the new generic face")->required();
+  command.add_option("--out", a.out, "folder for the new template")->required();
   command
       .add_option("--site_prior", a.options.site_prior,
-                  "how many points the present place of a site counts as")
+                  "weight of the present position of a site, in points")
       ->check(Finite())
       ->check(CLI::Range(0.0, 1e6))
       ->capture_default_str();
-  command.add_flag("--mean", a.options.move_mean,
-                   "move the mean as well: the face written then holds what the skins of these "
-                   "heads are off, so it is theirs too");
-  command
-      .add_option("--mean_prior", a.options.mean_prior,
-                  "how many points the present mean counts as")
+  command.add_flag(
+      "--mean", a.options.move_mean,
+      "move the mean too; the template then contains shape of the skins of these heads");
+  command.add_option("--mean_prior", a.options.mean_prior, "weight of the present mean, in points")
       ->check(Finite())
       ->check(CLI::Range(0.1, 1e6))
       ->capture_default_str();
-  command.add_option("--set", a.overrides, "path=value, laid over each configuration; repeatable")
+  command
+      .add_option("--set", a.overrides,
+                  "path=value, replaces an option of each configuration; may be repeated")
       ->allow_extra_args(false);
   command.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");
@@ -242,12 +246,12 @@ void DeclareRecentre(CLI::App& command, CommandLine& line) {
 
 std::span<const ProgramCommand> TemplateCommands() {
   static constexpr std::array kCommands = {
-      ProgramCommand{"template", "make a generic H-spline face of a head mesh with landmarks",
+      ProgramCommand{"template",
+                     "make a template, an H-spline face, from a head mesh with landmarks",
                      &DeclareTemplate},
-      ProgramCommand{
-          "recentre",
-          "set the sites of a generic face right, and its mean, by heads whose skin is known",
-          &DeclareRecentre},
+      ProgramCommand{"recentre",
+                     "correct the sites of a template, and its mean, by heads with known skin",
+                     &DeclareRecentre},
   };
   return kCommands;
 }

@@ -14,7 +14,7 @@ namespace semblance {
 void AddSet(CLI::App& command, WorkOptions& options) {
   command
       .add_option("--set", options.overrides,
-                  "path=value, laid over the configuration; may be repeated")
+                  "path=value, replaces an option of the configuration; may be repeated")
       ->allow_extra_args(false);
 }
 
@@ -43,7 +43,7 @@ CLI::Option* AddWords(CLI::App& command, const std::string& name, const std::str
       ->check(CLI::IsMember(words));
 }
 
-RunContext ContextOf(const WorkOptions& options) {
+RunContext MakeRunContext(const WorkOptions& options) {
   RunContext context;
   context.threads = options.threads;
   context.stop_token = options.stop;
@@ -53,13 +53,13 @@ RunContext ContextOf(const WorkOptions& options) {
   return context;
 }
 
-StagedFolder FolderOf(const WorkOptions& options, const std::string& default_out,
-                      GivenFiles given) {
+StagedFolder MakeStagedFolder(const WorkOptions& options, const std::string& default_out,
+                              GivenFiles given) {
   return {options.out.empty() ? default_out : options.out,
           options.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse, std::move(given)};
 }
 
-int TellFaults(const std::vector<std::string>& faults) {
+int PrintFaults(const std::vector<std::string>& faults) {
   for (const std::string& fault : faults) {
     fmt::print(stderr, "semblance: the result is not usable: {}\n", fault);
   }

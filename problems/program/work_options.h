@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What most commands take: what is laid over the configuration, where the results go, how many
-// threads there are and who is told of progress.
+// Options of most commands: overrides of the configuration, the folder for the results, the number
+// of threads, and whether progress is shown.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -27,19 +27,19 @@ struct WorkOptions {
   std::stop_token stop;
 };
 
-// --set
+// Adds --set.
 void AddSet(CLI::App& command, WorkOptions& options);
-// --out and --force
+// Adds --out and --force.
 void AddOutput(CLI::App& command, WorkOptions& options);
-// --threads and --quiet
+// Adds --threads and --quiet.
 void AddWork(CLI::App& command, CommandLine& line, WorkOptions& options);
 
-// An option that takes one of some words; take(n) for the n-th of them.
+// Adds an option whose value is one of `words`. Parsing the n-th word calls take(n).
 CLI::Option* AddWords(CLI::App& command, const std::string& name, const std::string& description,
                       const std::vector<std::string>& words,
                       const std::function<void(std::size_t)>& take);
 
-// One that takes a value of an enum, by its words in configurations (fields.h).
+// Adds an option whose value is an enum, by its names in configurations (fields.h).
 template <class E>
 void AddChoice(CLI::App& command, const std::string& name, const std::string& description,
                E& value) {
@@ -56,11 +56,12 @@ void AddChoice(CLI::App& command, const std::string& name, const std::string& de
            [&value](std::size_t n) { value = static_cast<E>(n); });
 }
 
-RunContext ContextOf(const WorkOptions& options);
-// given: what the command reads.
-StagedFolder FolderOf(const WorkOptions& options, const std::string& default_out, GivenFiles given);
+RunContext MakeRunContext(const WorkOptions& options);
+// given: the files that the command reads and must not replace.
+StagedFolder MakeStagedFolder(const WorkOptions& options, const std::string& default_out,
+                              GivenFiles given);
 
-// The exit code of a result with these faults.
-int TellFaults(const std::vector<std::string>& faults);
+// Prints the faults of a result and returns the exit code.
+int PrintFaults(const std::vector<std::string>& faults);
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/program/workbench_command.h"
+#include "problems/program/all_commands.h"
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -18,7 +18,7 @@
 
 #include "problems/command_line/exit_code.h"
 #include "problems/output/output_folder.h"
-#include "problems/program/stop_signals.h"
+#include "problems/program/program_end.h"
 #include "problems/serving/http_server.h"
 #include "surfaces/base/error.h"
 
@@ -27,7 +27,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the user typed.
+// The arguments of the command.
 struct WorkbenchArguments {
   std::string source, out;
   std::vector<std::pair<std::string, std::string>> references;
@@ -37,8 +37,8 @@ struct WorkbenchArguments {
   std::stop_token stop;
 };
 
-// A folder with work in it stands for itself.
-BenchOptions BenchOptionsOf(const WorkbenchArguments& a) {
+// If the source is the folder of a workbench, its work is continued.
+BenchOptions MakeBenchOptions(const WorkbenchArguments& a) {
   BenchOptions options;
   options.references = a.references;
   options.threads = a.threads;
@@ -55,7 +55,8 @@ BenchOptions BenchOptionsOf(const WorkbenchArguments& a) {
   return options;
 }
 
-// By a file that nobody else can read: others of this machine see the words of a command.
+// Passes the address in a file that only this user can read, because other users of this machine
+// can see the arguments of a command.
 void OpenBrowser(const fs::path& folder, const std::string& url) {
   const std::string file = (folder / ".semblance-workbench" / "open.html").string();
   const std::string page =
@@ -66,7 +67,8 @@ void OpenBrowser(const fs::path& folder, const std::string& url) {
                                               static_cast<ssize_t>(page.size());
   ::close(descriptor);
   if (!written) {
-    throw IoError(fmt::format("{}: cannot be written; open the address by hand", file));
+    throw IoError(
+        fmt::format("{}: cannot be written; open the address in the browser yourself", file));
   }
   if (::fork() == 0) {
     ::execlp("xdg-open", "xdg-open", file.c_str(), nullptr);
@@ -75,12 +77,14 @@ void OpenBrowser(const fs::path& folder, const std::string& url) {
 }
 
 int Workbench(const WorkbenchArguments& a) {
-  Bench bench(BenchOptionsOf(a));
+  Bench bench(MakeBenchOptions(a));
   HttpServerOptions listening;
   listening.port = a.port;
   HttpServer server(bench, listening);
-  fmt::print("folder: {}\nopen in a browser on this machine: {}\nCtrl-C ends it; nothing is lost\n",
-             bench.Folder().string(), server.Url());
+  fmt::print(
+      "folder: {}\nopen in a browser on this machine: {}\nCtrl-C ends the program; nothing is "
+      "lost\n",
+      bench.Folder().string(), server.Url());
   std::fflush(stdout);
   if (a.open) {
     OpenBrowser(bench.Folder(), server.Url());
@@ -90,9 +94,9 @@ int Workbench(const WorkbenchArguments& a) {
     while (!a.stop.stop_requested()) {
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
     }
-    EndInOwnTime();  // open connections may take some seconds
+    RemoveStopTimeout();  // closing open connections may take some seconds
   }
-  fmt::print("ended; `semblance workbench {}` goes on\n", bench.Folder().string());
+  fmt::print("ended; `semblance workbench {}` continues the work\n", bench.Folder().string());
   return kDone;
 }
 
@@ -102,15 +106,15 @@ void DeclareWorkbench(CLI::App& workbench, CommandLine& line) {
   workbench.add_option(
       "SOURCE", a.source,
       "mesh of a skull, CT (file or DICOM folder), configuration, or the folder of "
-      "a workbench to go on with; none: choose in the page");
+      "a workbench to continue; none: choose in the page");
   workbench.add_option("--out", a.out,
-                       "folder that holds the work; with work in it, that goes on "
-                       "[out/NAME_workbench]");
-  workbench.add_option("--port", a.port, "of 127.0.0.1 [any that is free]")
+                       "folder for the work; work in it is continued [out/NAME_workbench]");
+  workbench.add_option("--port", a.port, "port of 127.0.0.1 [any free one]")
       ->check(CLI::Range(0, 65535));
-  workbench.add_option("--reference", a.references,
-                       "a marked skull and its landmarks, for proposals; may stand several times");
-  workbench.add_option("--threads", a.threads, "threads to use; no result depends on it")
+  workbench.add_option(
+      "--reference", a.references,
+      "SKULL LANDMARKS: a skull with known landmarks, for proposals; may be repeated");
+  workbench.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
       ->check(CLI::Range(1, 1024));
   workbench.add_flag("--open", a.open, "open the page in the desktop's browser (xdg-open)");
 }

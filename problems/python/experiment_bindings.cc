@@ -10,10 +10,8 @@
 #include "problems/inputs/input_files.h"
 #include "problems/output/staged_folder.h"
 #include "problems/pipeline/experiment_config.h"
-#include "problems/python/arrays.h"
 #include "problems/python/bindings.h"
-#include "problems/python/interruptible.h"
-#include "problems/python/option_text.h"
+#include "problems/python/values.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/run.h"
@@ -35,7 +33,7 @@ std::vector<std::string> Overrides(const py::dict& set) {
   return overrides;
 }
 
-WhenNotEmpty Asked(bool force) {
+WhenNotEmpty MakePolicy(bool force) {
   return force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse;
 }
 
@@ -43,7 +41,7 @@ py::object FromJson(const std::string& text) {
   return py::module_::import("json").attr("loads")(text);
 }
 
-// What a run gives: its result.json, its surface, and why it cannot be used.
+// Runs an experiment and returns result.json, the surface and the faults of the result.
 py::dict RunConfig(const std::string& config, const py::dict& set,
                    const std::optional<std::string>& out, bool force, int threads) {
   const auto experiment = ReadConfig<Experiment>(config, Overrides(set));
@@ -53,7 +51,7 @@ py::dict RunConfig(const std::string& config, const py::dict& set,
     context.stop_token = stop;
     std::optional<StagedFolder> folder;
     if (out) {
-      folder.emplace(*out, Asked(force), GivenTo(experiment, config, kRunFiles));
+      folder.emplace(*out, MakePolicy(force), GivenTo(experiment, config, kRunFiles));
     }
     RunResult found = Run(experiment, context);
     if (folder) {
@@ -62,15 +60,16 @@ py::dict RunConfig(const std::string& config, const py::dict& set,
     }
     return found;
   });
-  py::dict answer;
-  answer["result"] = FromJson(ResultJson(experiment, result).dump());
-  answer["surface"] = result.fit.surface;
-  answer["faults"] = result.Faults();
-  return answer;
+  py::dict results;
+  results["result"] = FromJson(ResultJson(experiment, result).dump());
+  results["surface"] = result.fit.surface;
+  results["faults"] = result.Faults();
+  return results;
 }
 
-// A table of pandas, where it is installed; else the rows as dictionaries.
-py::object TableOf(const fs::path& csv) {
+// Reads a CSV file as a pandas.DataFrame if pandas is installed, otherwise as a list of
+// dictionaries.
+py::object ReadTable(const fs::path& csv) {
   try {
     return py::module_::import("pandas").attr("read_csv")(csv.string());
   } catch (const py::error_already_set& error) {
@@ -84,27 +83,28 @@ py::object TableOf(const fs::path& csv) {
   return rows;
 }
 
-// What `semblance study` has written into the folder, as it stands.
-py::object TableIn(const fs::path& folder) {
+// Reads the present trials.csv of the folder of a study.
+py::object ReadStudyTable(const fs::path& folder) {
   if (!fs::exists(folder / "plan.json")) {
-    throw IoError(fmt::format("{}: not a folder of a study; it has no plan.json", folder.string()));
+    throw IoError(
+        fmt::format("{}: not the folder of a study, because it has no plan.json", folder.string()));
   }
   if (!fs::exists(folder / "trials.csv")) {
     throw IoError(fmt::format(
-        "{}: it has no trials.csv yet; `semblance report {}` makes it of the trials that are done",
+        "{}: it has no trials.csv yet; `semblance report {}` makes it from the finished trials",
         folder.string(), folder.string()));
   }
-  return TableOf(folder / "trials.csv");
+  return ReadTable(folder / "trials.csv");
 }
 
 py::object RunStudyFile(const std::string& path, const std::optional<std::string>& given,
                         int jobs) {
   if (fs::is_directory(path)) {
     if (given) {
-      throw InputError(fmt::format(
-          "{}: it is the folder of a study, which is read where it lies; leave 'out' away", path));
+      throw InputError(
+          fmt::format("{}: this is the folder of a study, which is only read; omit 'out'", path));
     }
-    return TableIn(path);
+    return ReadStudyTable(path);
   }
   const fs::path out = given ? fs::path(*given) : "out" / fs::path(path).stem();
   const StudyPlan plan = ReadStudy(path);
@@ -117,24 +117,25 @@ py::object RunStudyFile(const std::string& path, const std::optional<std::string
     OutputFolder folder(out, WhenNotEmpty::kReplaceFiles);
     WriteStudyTables(folder);
   });
-  return TableOf(out / "trials.csv");
+  return ReadTable(out / "trials.csv");
 }
 
 }  // namespace
 
 void BindExperiments(py::module_& module) {
-  module.def("run", &RunConfig, py::arg("config"), py::arg("set") = py::dict(),
-             py::arg("out") = py::none(), py::arg("force") = false, py::arg("threads") = 1,
-             "Runs an experiment, as `semblance run` does. set: options by path, e.g. "
-             "{'implicit.resolution': 60}. Returns {'result': result.json, 'surface': HSpline, "
-             "'faults': why it cannot be used, or []}; with `out` the files of a run are written "
-             "there too.");
-  module.def("study", &RunStudyFile, py::arg("path"), py::arg("out") = py::none(),
-             py::arg("jobs") = 1,
-             "Runs a study, or what is left of it, into the folder `out` (left out: out/NAME, as "
-             "`semblance study NAME.yaml` does), and returns trials.csv in long form; with the "
-             "folder of a study as its path, what stands there. A "
-             "pandas.DataFrame where pandas is installed, else a list of dictionaries.");
+  module.def(
+      "run", &RunConfig, py::arg("config"), py::arg("set") = py::dict(),
+      py::arg("out") = py::none(), py::arg("force") = false, py::arg("threads") = 1,
+      "Runs an experiment, as `semblance run` does. set: options by path, e.g. "
+      "{'implicit.resolution': 60}. Returns {'result': result.json, 'surface': HSpline, "
+      "'faults': reasons why the result cannot be used, or []}. With `out`, writes the files "
+      "of a run to that folder too.");
+  module.def(
+      "study", &RunStudyFile, py::arg("path"), py::arg("out") = py::none(), py::arg("jobs") = 1,
+      "Runs a study, or its unfinished trials, into the folder `out` (default: out/NAME, like "
+      "`semblance study NAME.yaml`), and returns trials.csv in long form. If `path` is the "
+      "folder of a study, only reads its trials.csv. Returns a pandas.DataFrame if pandas is "
+      "installed, otherwise a list of dictionaries.");
 }
 
 }  // namespace semblance

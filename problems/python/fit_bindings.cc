@@ -7,18 +7,16 @@
 
 #include "problems/config/config.h"
 #include "problems/points/point_fit.h"
-#include "problems/python/arrays.h"
 #include "problems/python/bindings.h"
-#include "problems/python/interruptible.h"
-#include "problems/python/option_text.h"
+#include "problems/python/values.h"
 
 namespace semblance {
 namespace {
 
 namespace py = pybind11;
 
-PointTable TableOf(const Doubles& points, const std::optional<Doubles>& uv,
-                   const std::optional<Doubles>& weights) {
+PointTable MakePointTable(const Doubles& points, const std::optional<Doubles>& uv,
+                          const std::optional<Doubles>& weights) {
   PointTable table;
   table.positions = Points3(points, "points");
   if (uv) {
@@ -30,7 +28,7 @@ PointTable TableOf(const Doubles& points, const std::optional<Doubles>& uv,
   }
   for (const std::size_t count : {table.uv.size(), table.weights.size()}) {
     if (count != 0 && count != table.positions.size()) {
-      throw InputError("points, uv and weights must have as many rows as each other");
+      throw InputError("points, uv and weights must have the same number of rows");
     }
   }
   return table;
@@ -38,7 +36,7 @@ PointTable TableOf(const Doubles& points, const std::optional<Doubles>& uv,
 
 PointFit FitArrays(const Doubles& points, const std::optional<Doubles>& uv,
                    const std::optional<Doubles>& weights, int threads, const py::kwargs& options) {
-  PointTable table = TableOf(points, uv, weights);
+  PointTable table = MakePointTable(points, uv, weights);
   const auto chosen = ReadConfigText<PointFitOptions>(OptionText(options), "fit(...)");
   return Interruptible([&](const std::stop_token& stop) {
     RunContext context;
@@ -49,26 +47,29 @@ PointFit FitArrays(const Doubles& points, const std::optional<Doubles>& uv,
 }
 
 std::string FitDocumentation() {
-  return "An H-spline through scattered points, finer where they ask for it.\n\npoints: n x 3, mm. "
-         "uv: n x 2, or None: by `parameters`. weights: n, above 0. Options are those of a "
-         "configuration of `semblance fit`, dictionaries within each other:\n\n" +
+  return "Fits an H-spline to scattered points, refined where they need it.\n\npoints: n x 3, mm. "
+         "uv: n "
+         "x 2, or None: computed by the option `parameters`. weights: n, positive. The options are "
+         "those of a configuration of `semblance fit`, as nested dictionaries:\n\n" +
          OptionsReference<PointFitOptions>();
 }
 
 }  // namespace
 
 void BindFit(py::module_& module) {
-  py::class_<PointFit>(module, "PointFit", "What fit() found.")
+  py::class_<PointFit>(module, "PointFit", "Result of fit().")
       .def_property_readonly("surface", [](const PointFit& f) { return f.fit.surface; })
       .def_property_readonly(
-          "uv", [](const PointFit& f) { return ArrayOf(f.fit.uv); }, "n x 2: where each point lies")
+          "uv", [](const PointFit& f) { return MakeArray(f.fit.uv); },
+          "n x 2: (u, v) of each point")
       .def_property_readonly(
-          "residuals_mm", [](const PointFit& f) { return ArrayOf(f.fit.residual_mm); },
-          "n: distance of the surface at the point's (u, v)")
+          "residuals_mm", [](const PointFit& f) { return MakeArray(f.fit.residual_mm); },
+          "n: distance of each point from the surface at its (u, v)")
       .def_property_readonly("rms_mm", [](const PointFit& f) { return f.fit.point_rms_mm; })
       .def_property_readonly("parameters", [](const PointFit& f) { return f.parameters; })
       .def_property_readonly("usable", [](const PointFit& f) { return f.Faults().empty(); })
-      .def_property_readonly("faults", &PointFit::Faults, "why it cannot be used; else empty");
+      .def_property_readonly("faults", &PointFit::Faults,
+                             "reasons why the result cannot be used, or empty");
   module.def("fit", &FitArrays, py::arg("points"), py::arg("uv") = py::none(),
              py::arg("weights") = py::none(), py::arg("threads") = 1, FitDocumentation().c_str());
 }

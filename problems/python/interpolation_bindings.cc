@@ -2,9 +2,8 @@
 #include "interp/dowels/dowel_network.h"
 #include "interp/interpolate_depth.h"
 #include "problems/config/config.h"
-#include "problems/python/arrays.h"
 #include "problems/python/bindings.h"
-#include "problems/python/option_text.h"
+#include "problems/python/values.h"
 
 namespace semblance {
 namespace {
@@ -16,15 +15,15 @@ struct SchemeChoice {
 };
 template <class Visitor>
 void Fields(Visitor& visit, SchemeChoice& o) {
-  visit(FieldInfo{.name = "scheme", .doc = "how depth is interpolated between the dowels"},
+  visit(FieldInfo{.name = "scheme", .doc = "interpolation of depth between the depth markers"},
         o.scheme);
 }
 
-// On the vertices nearest to the given bases, along their normals.
-std::vector<Dowel> DowelsAt(const std::vector<Vec3>& bases, const std::vector<Vec3>& directions,
-                            std::span<const double> depths) {
+// Dowels at the given bases, along the given directions.
+std::vector<Dowel> MakeDowels(const std::vector<Vec3>& bases, const std::vector<Vec3>& directions,
+                              std::span<const double> depths) {
   if (directions.size() != bases.size() || depths.size() != bases.size()) {
-    throw InputError("bases, directions and depths_mm must have as many rows as each other");
+    throw InputError("bases, directions and depths_mm must have the same number of rows");
   }
   std::vector<Dowel> dowels;
   for (std::size_t k = 0; k < bases.size(); ++k) {
@@ -39,8 +38,8 @@ std::vector<Dowel> DowelsAt(const std::vector<Vec3>& bases, const std::vector<Ve
 py::tuple Interpolate(const Doubles& vertices, const Indices& triangles, const Doubles& bases,
                       const Doubles& directions, const Doubles& depths_mm, const py::object& scheme,
                       int threads) {
-  const TriMesh skull = MeshOf(vertices, triangles);
-  const std::vector<Dowel> dowels = DowelsAt(
+  const TriMesh skull = MakeMesh(vertices, triangles);
+  const std::vector<Dowel> dowels = MakeDowels(
       Points3(bases, "bases"), Points3(directions, "directions"), Numbers(depths_mm, "depths_mm"));
   const auto choice =
       ReadConfigText<SchemeChoice>("{scheme: " + OptionText(scheme) + "}", "interpolate(...)");
@@ -53,7 +52,7 @@ py::tuple Interpolate(const Doubles& vertices, const Indices& triangles, const D
     const DowelNetwork network;
     field = InterpolateDepth(choice.scheme, {skull, normals, dowels, network}, context);
   }
-  return py::make_tuple(ArrayOf(field.depth_mm), ArrayOf(field.sd_mm));
+  return py::make_tuple(MakeArray(field.depth_mm), MakeArray(field.sd_mm));
 }
 
 }  // namespace
@@ -63,10 +62,11 @@ void BindInterpolation(py::module_& module) {
       "interpolate", &Interpolate, py::arg("vertices"), py::arg("triangles"), py::arg("bases"),
       py::arg("directions"), py::arg("depths_mm"), py::arg("scheme") = "kriging",
       py::arg("threads") = 1,
-      "(depth_mm, sd_mm) per vertex of a skull, from a few dowels; NaN where there is none.\n\n"
+      "Returns (depth_mm, sd_mm) per vertex of a skull from a few depth markers; NaN where the "
+      "scheme gives none.\n\n"
       "vertices n x 3, triangles m x 3 (from 0), bases and directions k x 3, depths_mm k. "
-      "scheme: the name of one that needs no dowel network, or a dictionary with `type` and "
-      "its options, as `interp` of a configuration.");
+      "scheme: name of a scheme without a network, or a dictionary with `type` and its options, "
+      "like `interp` in a configuration.");
 }
 
 }  // namespace semblance

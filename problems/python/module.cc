@@ -6,8 +6,8 @@
 namespace semblance {
 namespace {
 
-// The program's errors, with their own words. ConfigError and InputError are values that cannot be
-// used; IoError is a file that cannot.
+// Maps the program's errors to Python's. ConfigError and InputError report values that cannot be
+// used, IoError reports files that cannot be used.
 void BindErrors(pybind11::module_& module) {
   pybind11::register_exception<InputError>(module, "InputError", PyExc_ValueError);
   pybind11::register_exception<ConfigError>(module, "ConfigError", PyExc_ValueError);
@@ -19,8 +19,8 @@ void BindErrors(pybind11::module_& module) {
 
 PYBIND11_MODULE(semblance, module) {
   module.doc() =
-      "Faces from skulls: H-splines, fits of scattered points, depths between dowels, experiments "
-      "and studies. Lengths are in mm. Arrays are NumPy's, of doubles.";
+      "Faces from skulls: H-splines, fits of scattered points, depths between depth markers, "
+      "experiments and studies. Lengths are in mm. Arrays are NumPy arrays of doubles.";
   module.attr("__version__") = SEMBLANCE_VERSION;
   semblance::BindErrors(module);
   semblance::BindSurface(module);

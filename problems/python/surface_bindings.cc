@@ -4,8 +4,8 @@
 #include <memory>
 
 #include "problems/edits/edit_script.h"
-#include "problems/python/arrays.h"
 #include "problems/python/bindings.h"
+#include "problems/python/values.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_batch.h"
@@ -18,7 +18,7 @@ namespace {
 namespace py = pybind11;
 using Release = py::call_guard<py::gil_scoped_release>;
 
-// rows x columns x 3.
+// Shape: rows x columns x 3.
 Doubles NetArray(const HSplineSurface& surface, int level) {
   const ControlNet net = surface.Net(level);
   Doubles array({py::ssize_t{net.rows}, py::ssize_t{net.columns}, py::ssize_t{3}});
@@ -26,9 +26,9 @@ Doubles NetArray(const HSplineSurface& surface, int level) {
   return array;
 }
 
-ControlNet NetOf(const Doubles& array) {
+ControlNet ParseNet(const Doubles& array) {
   if (array.ndim() != 3 || array.shape(2) != 3) {
-    throw InputError("a net is an array of rows x columns x 3");
+    throw InputError("a net must be an array of rows x columns x 3");
   }
   ControlNet net{.columns = static_cast<int>(array.shape(1)),
                  .rows = static_cast<int>(array.shape(0)),
@@ -38,7 +38,7 @@ ControlNet NetOf(const Doubles& array) {
 }
 
 std::unique_ptr<HSplineSurface> MakeSurface(const Doubles& level0, int max_level, bool periodic_u) {
-  const ControlNet net = NetOf(level0);
+  const ControlNet net = ParseNet(level0);
   const HSplineShape shape{.patches_u = periodic_u ? net.columns : net.columns - 3,
                            .patches_v = net.rows - 3,
                            .max_level = max_level,
@@ -53,7 +53,7 @@ Doubles PointsAt(const HSplineSurface& surface, const Doubles& uv, int threads) 
     const py::gil_scoped_release release;
     points = HSplineBatch(surface).Points(at, threads);
   }
-  return ArrayOf(points);
+  return MakeArray(points);
 }
 
 Doubles NormalsAt(const HSplineSurface& surface, const Doubles& uv, int threads) {
@@ -63,19 +63,19 @@ Doubles NormalsAt(const HSplineSurface& surface, const Doubles& uv, int threads)
     const py::gil_scoped_release release;
     samples = HSplineBatch(surface).PointsAndNormals(at, threads);
   }
-  return ArrayOf(samples.normals);
+  return MakeArray(samples.normals);
 }
 
 Doubles DerivativesAt(const HSplineSurface& surface, const Doubles& uv, int du, int dv) {
   if (du < 0 || dv < 0 || du + dv > 2) {
     throw InputError(
-        fmt::format("derivatives of order {} and {}; expected two in all at most", du, dv));
+        fmt::format("derivatives of order {} and {}; the sum must be at most 2", du, dv));
   }
   std::vector<Vec3> derivatives;
   for (const Vec2& at : Points2(uv, "uv")) {
     derivatives.push_back(surface.Derivative(at, {du, dv}));
   }
-  return ArrayOf(derivatives);
+  return MakeArray(derivatives);
 }
 
 py::tuple Project(const HSplineSurface& surface, const Doubles& points) {
@@ -91,65 +91,70 @@ py::tuple Project(const HSplineSurface& surface, const Doubles& points) {
       distance_mm.push_back(foot.distance_mm);
     }
   }
-  return py::make_tuple(ArrayOf(uv), ArrayOf(distance_mm));
+  return py::make_tuple(MakeArray(uv), MakeArray(distance_mm));
 }
 
 py::tuple MeshAt(const HSplineSurface& surface, int per_patch) {
   const Tessellation drawn = Tessellate(surface, per_patch);
-  return py::make_tuple(ArrayOf(drawn.mesh.points), ArrayOf(drawn.mesh.triangles),
-                        ArrayOf(drawn.uv));
+  return py::make_tuple(MakeArray(drawn.mesh.points), MakeArray(drawn.mesh.triangles),
+                        MakeArray(drawn.uv));
 }
 
-// What can be asked of a surface.
-void BindQuestions(py::class_<HSplineSurface>& surface) {
-  surface.def("points", &PointsAt, py::arg("uv"), py::arg("threads") = 1, "n x 3, of n x 2 (u, v).")
+// Evaluation, projection and tessellation of a surface.
+void BindEvaluation(py::class_<HSplineSurface>& surface) {
+  surface
+      .def("points", &PointsAt, py::arg("uv"), py::arg("threads") = 1,
+           "n x 3 points at n x 2 (u, v).")
       .def("normals", &NormalsAt, py::arg("uv"), py::arg("threads") = 1,
-           "n x 3, unit; zero where the tangents vanish.")
+           "n x 3 unit normals; zero where the tangents vanish.")
       .def("derivatives", &DerivativesAt, py::arg("uv"), py::arg("du"), py::arg("dv"),
-           "n x 3: so many times by u and by v, two in all at most.")
+           "n x 3 derivatives of order du in u and dv in v, with du + dv <= 2.")
       .def("project", &Project, py::arg("points"),
            "(uv, distance_mm) of the closest points of the surface.")
       .def("mesh", &MeshAt, py::arg("per_patch") = 4,
-           "(vertices, triangles, uv): so many quads along each side of a finest patch.");
+           "(vertices, triangles, uv), with per_patch quads along each side of a finest patch.");
 }
 
-// Its control vertices, and their edits.
+// The control vertices of a surface, and edits of them.
 void BindNets(py::class_<HSplineSurface>& surface) {
   surface
       .def("net", &NetArray, py::arg("level"),
-           "The control vertices of a level, rows x columns x 3, absolute, with coarser detail.")
+           "The control vertices of a level, rows x columns x 3, as absolute positions that "
+           "include coarser "
+           "detail.")
       .def(
           "set_net",
-          [](HSplineSurface& s, int level, const Doubles& net) { s.SetNet(level, NetOf(net)); },
+          [](HSplineSurface& s, int level, const Doubles& net) { s.SetNet(level, ParseNet(net)); },
           py::arg("level"), py::arg("net"),
-          "Makes net(level) equal to this. Finer detail rides along.")
+          "Sets the control vertices of a level. Finer detail moves with them.")
       .def(
           "edit",
           [](HSplineSurface& s, const std::string& script) {
             ApplyEdits(ReadEditScript(script), s);
           },
-          py::arg("script"), "Makes the edits of a script, as `semblance edit` does.");
+          py::arg("script"), "Applies the edits of a script, as `semblance edit` does.");
 }
 
 }  // namespace
 
 void BindSurface(py::module_& module) {
-  py::class_<HSplineSurface> surface(module, "HSpline",
-                                     "A hierarchical B-spline surface: bicubic, with dyadic "
-                                     "levels; detail is kept as offsets from "
-                                     "the next coarser level. (u, v) lie in [0,1] x [0,1].");
+  py::class_<HSplineSurface> surface(
+      module, "HSpline",
+      "A hierarchical B-spline surface: bicubic, with dyadic levels. Detail "
+      "is stored as offsets from the next coarser level. (u, v) lie in "
+      "[0,1] x [0,1].");
   surface
-      .def(
-          py::init(&MakeSurface), py::arg("level0"), py::arg("max_level") = 0,
-          py::arg("periodic_u") = false,
-          "From the control vertices of level 0, rows x columns x 3: three more than patches along "
-          "each open side.")
+      .def(py::init(&MakeSurface), py::arg("level0"), py::arg("max_level") = 0,
+           py::arg("periodic_u") = false,
+           "Makes a surface from the control vertices of level 0, rows x columns x 3. An open side "
+           "has "
+           "three more vertices than patches.")
       .def_static(
           "read", [](const std::string& path) { return ReadHSpline(path); }, py::arg("path"),
-          "From a .hspline.json, to the bit.")
+          "Reads a .hspline.json without loss.")
       .def(
           "write", [](const HSplineSurface& s, const std::string& path) { WriteHSpline(path, s); },
-          py::arg("path"), "To a .hspline.json; read() gives the same surface to the bit.")
+          py::arg("path"), "Writes a .hspline.json; read() gives the identical surface.")
       .def_property_readonly("max_level",
                              [](const HSplineSurface& s) { return s.shape().max_level; })
       .def_property_readonly("patches",
@@ -158,7 +163,7 @@ void BindSurface(py::module_& module) {
                              })
       .def_property_readonly("periodic_u",
                              [](const HSplineSurface& s) { return s.shape().ClosedU(); });
-  BindQuestions(surface);
+  BindEvaluation(surface);
   BindNets(surface);
 }
 

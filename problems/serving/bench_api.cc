@@ -2,6 +2,7 @@
 #include "problems/serving/bench_api.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -20,7 +21,6 @@
 #include "problems/serving/bench_json.h"
 #include "problems/workbench/bench_actions.h"
 #include "problems/workbench/bench_assets.h"
-#include "problems/workbench/bench_incoming.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
@@ -36,29 +36,32 @@ constexpr const char* kJson = "application/json";
 
 BenchReply JsonReply(std::string body) { return {200, kJson, std::move(body), {}}; }
 
-// Words that quote what was sent may be as long as that.
-BenchReply WordsReply(int status, const char* key, const std::string& words) {
-  constexpr std::size_t kMost = 2000;
+// Cuts the message, because it may quote a request of any length.
+BenchReply MessageReply(int status, const char* key, const std::string& message) {
+  constexpr std::size_t kMaxMessage_bytes = 2000;
   return {status,
           kJson,
-          Json{{key, words.substr(0, kMost)}}.dump(-1, ' ', false, Json::error_handler_t::replace),
+          Json{{key, message.substr(0, kMaxMessage_bytes)}}.dump(-1, ' ', false,
+                                                                 Json::error_handler_t::replace),
           {}};
 }
 
-// A request that the page does not make.
-BenchReply Fault(int status, const std::string& words) {
-  return WordsReply(status, "error", words);
+// The reply to a request that the page never makes.
+BenchReply ErrorReply(int status, const std::string& message) {
+  return MessageReply(status, "error", message);
 }
 
-// What a person cannot have is an answer like any other: a browser lists each status from 400 on
-// as a fault of the page.
-BenchReply Refusal(const std::string& words) { return WordsReply(200, "refused", words); }
+// The reply to a person's action that is impossible. Its status is 200, because a browser lists
+// each status from 400 on as a fault of the page.
+BenchReply RefusalReply(const std::string& message) {
+  return MessageReply(200, "refused", message);
+}
 
 class BadRequest : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-Json BodyOf(const BenchRequest& request) {
+Json ParseBody(const BenchRequest& request) {
   try {
     return ParseJson(request.body, "the request");
   } catch (const IoError& error) {
@@ -67,14 +70,14 @@ Json BodyOf(const BenchRequest& request) {
 }
 
 BenchReply StateReply(const Bench& bench) {
-  return JsonReply(SnapshotJson(bench.Look(), bench.Folder()));
+  return JsonReply(SnapshotJson(bench.TakeSnapshot(), bench.Folder()));
 }
 
 // ---------------------------------------------------------------------------------------------
 // The page and its files
 // ---------------------------------------------------------------------------------------------
 
-const char* TypeOf(const std::string& name) {
+const char* ContentType(const std::string& name) {
   constexpr std::array<std::pair<const char*, const char*>, 7> kTypes = {
       {{".html", "text/html; charset=utf-8"},
        {".css", "text/css; charset=utf-8"},
@@ -89,27 +92,27 @@ const char* TypeOf(const std::string& name) {
   return found == kTypes.end() ? "application/octet-stream" : found->second;
 }
 
-// Only what the program carries: no name leads to the disk.
+// Serves only files that are part of the program. No name leads to the disk.
 BenchReply PageFile(const std::string& path) {
   const std::string name = path.empty() ? "index.html" : path;
   if (name == "three.js") {
-    return {200, TypeOf(name), std::string(ThreeScript()), {}};
+    return {200, ContentType(name), std::string(ThreeScript()), {}};
   }
   if (name == "report.css") {
-    return {200, TypeOf(name), std::string(ReportStyle()), {}};
+    return {200, ContentType(name), std::string(ReportStyle()), {}};
   }
   if (name == "view.js") {
-    return {200, TypeOf(name), std::string(ReportPartsScript()), {}};
+    return {200, ContentType(name), std::string(ReportPartsScript()), {}};
   }
   for (const BenchAsset& file : PageFiles()) {
     if (file.name == name) {
-      return {200, TypeOf(name), std::string(file.text), {}};
+      return {200, ContentType(name), std::string(file.text), {}};
     }
   }
-  return Fault(404, fmt::format("there is no '{}' here", name));
+  return ErrorReply(404, fmt::format("the page has no file '{}'", name));
 }
 
-// A file of the last run: one that its manifest or its report names, never one outside run/.
+// Serves a file of the last run, never one outside run/.
 BenchReply RunFile(const Bench& bench, const std::string& name) {
   const fs::path root = bench.Folder() / "run";
   std::error_code error;
@@ -117,17 +120,17 @@ BenchReply RunFile(const Bench& bench, const std::string& name) {
   const fs::path inside = error ? fs::path() : path.lexically_relative(fs::canonical(root));
   const bool is_inside = !inside.empty() && inside.begin()->string() != "..";
   if (error || !is_inside || !fs::is_regular_file(path)) {
-    return Fault(404, fmt::format("the last run has no '{}'", name));
+    return ErrorReply(404, fmt::format("the last run has no file '{}'", name));
   }
-  return {200, TypeOf(name), ReadFileBytes(path), {}};
+  return {200, ContentType(name), ReadFileBytes(path), {}};
 }
 
 // ---------------------------------------------------------------------------------------------
-// Asking
+// Requests that change nothing
 // ---------------------------------------------------------------------------------------------
 
 BenchReply Meshes(Bench& bench, const BenchRequest&) {
-  return JsonReply(MeshesJson(*bench.Look().subject));
+  return JsonReply(MeshesJson(*bench.TakeSnapshot().subject));
 }
 
 BenchReply Sites(Bench&, const BenchRequest&) { return JsonReply(SitesJson()); }
@@ -142,7 +145,7 @@ std::string QueryText(const BenchRequest& request, const char* key) {
   return at == request.query.end() ? std::string() : at->second;
 }
 
-// Where one site lies, for ?site=CODE.
+// Picture of the place of one site, for ?site=CODE.
 BenchReply SitePictureReply(Bench&, const BenchRequest& request) {
   static const SiteSketch kSketch = MakeSiteSketch(/*threads=*/1);
   return {200, "image/png", EncodePng(PictureOf(kSketch, QueryText(request, "site"))), {}};
@@ -150,7 +153,7 @@ BenchReply SitePictureReply(Bench&, const BenchRequest& request) {
 
 BenchReply Schema(Bench&, const BenchRequest&) { return JsonReply(OptionsSchema<Experiment>()); }
 
-// Files that an option may name: those of the folder that fit.
+// The files of the folder that options may name, the parts of the template and the kept features.
 BenchReply Files(Bench& bench, const BenchRequest&) {
   Json json = {{"tables", Json::array()}, {"networks", Json::array()}};
   for (const auto& [kind, list] : json.items()) {
@@ -173,9 +176,9 @@ BenchReply Files(Bench& bench, const BenchRequest&) {
 
 BenchReply FaceReply(const BenchFace& face) { return JsonReply(FaceJson(face)); }
 
-BenchVariant VariantAsked(const BenchRequest& request) {
-  const auto asked = request.query.find("variant");
-  return asked == request.query.end() ? BenchVariant::kAsIs : VariantCalled(asked->second);
+BenchVariant RequestedVariant(const BenchRequest& request) {
+  const auto name = request.query.find("variant");
+  return name == request.query.end() ? BenchVariant::kAsIs : FindVariant(name->second);
 }
 
 BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
@@ -183,11 +186,11 @@ BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
   if (path != request.query.end() && value != request.query.end()) {
     return FaceReply(bench.CoarseWith({path->second, value->second}));
   }
-  return FaceReply(bench.Coarse(VariantAsked(request)));
+  return FaceReply(bench.Coarse(RequestedVariant(request)));
 }
 
 BenchReply VariantReply(Bench& bench, const BenchRequest& request) {
-  return FaceReply(bench.FullVariant(VariantAsked(request)));
+  return FaceReply(bench.FullVariant(RequestedVariant(request)));
 }
 
 BenchReply FullReply(Bench& bench, const BenchRequest&) { return FaceReply(bench.Full()); }
@@ -196,42 +199,48 @@ BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
   const auto format = request.query.find("format");
   const std::string name =
       "landmarks" + (format == request.query.end() ? std::string(".yaml") : format->second);
-  const LandmarkFile file = LandmarksOf(Now(bench.Look().history));
+  const LandmarkFile file = ToLandmarkFile(CurrentState(bench.TakeSnapshot().history));
   return {200, "application/octet-stream", EncodeLandmarks(file, name), name};
 }
 
-// The face of the last run with its edits, or that of a variant, for other programs.
+// Exports the face of the last run with its edits, or the face of a variant.
 BenchReply FaceFile(Bench& bench, const BenchRequest& request) {
   const auto format = request.query.find("format");
   const std::string extension = format == request.query.end() ? ".ply" : format->second;
   const bool is_variant = request.query.contains("variant");
-  const BenchFace face = is_variant ? bench.FullVariant(VariantAsked(request)) : bench.Full();
+  const BenchFace face = is_variant ? bench.FullVariant(RequestedVariant(request)) : bench.Full();
   const std::string name =
-      is_variant ? std::string(NameOf(VariantAsked(request))) : std::string("face");
+      is_variant ? std::string(VariantName(RequestedVariant(request))) : std::string("face");
   return {200, "application/octet-stream",
           EncodeFace(face.surface, extension, /*chord_mm=*/std::nullopt, /*threads=*/1),
           name + extension};
 }
 
 // ---------------------------------------------------------------------------------------------
-// Doing
+// Actions
 // ---------------------------------------------------------------------------------------------
 
-Vec3 VectorOf(const Json& json, const char* key) {
+Vec3 ReadVector(const Json& json, const char* key) {
   const auto numbers = json.at(key).get<std::array<double, 3>>();
   return {numbers[0], numbers[1], numbers[2]};
 }
 
-std::string TextOf(const Json& json, const char* key) { return json.at(key).get<std::string>(); }
+std::string ReadText(const Json& json, const char* key) { return json.at(key).get<std::string>(); }
 
-LandmarkRemarks RemarksOf(const Json& json) {
-  constexpr auto kWords = EnumNames(Certainty{});
-  const auto* const word = std::ranges::find(kWords, TextOf(json, "certainty"));
-  if (word == kWords.end()) {
-    throw InputError("certainty: give high, medium or low");
+template <class Enum>
+Enum ReadEnum(const Json& json, const char* key) {
+  constexpr auto kNames = EnumNames(Enum{});
+  const auto* const name = std::ranges::find(kNames, ReadText(json, key));
+  if (name == kNames.end()) {
+    throw InputError(fmt::format("{}: '{}' is unknown; give one of {}", key, ReadText(json, key),
+                                 fmt::join(kNames, ", ")));
   }
-  LandmarkRemarks remarks{.certainty = static_cast<Certainty>(word - kWords.begin()),
-                          .note = TextOf(json, "note")};
+  return static_cast<Enum>(name - kNames.begin());
+}
+
+LandmarkRemarks ReadRemarks(const Json& json) {
+  LandmarkRemarks remarks{.certainty = ReadEnum<Certainty>(json, "certainty"),
+                          .note = ReadText(json, "note")};
   if (!json.at("depth_mm").is_null()) {
     remarks.depth_along_normal_mm = json.at("depth_mm").get<double>();
   }
@@ -241,100 +250,97 @@ LandmarkRemarks RemarksOf(const Json& json) {
 using Action = void (*)(Bench&, const Json&);
 
 void Place(Bench& bench, const Json& json) {
-  bench.PlaceByRay(TextOf(json, "site"), VectorOf(json, "origin"), VectorOf(json, "direction"),
-                   VectorOf(json, "near"));
+  bench.PlaceByRay(ReadText(json, "site"), ReadVector(json, "origin"),
+                   ReadVector(json, "direction"), ReadVector(json, "near"));
 }
 void Remove(Bench& bench, const Json& json) {
-  const std::string site = TextOf(json, "site");
-  bench.Do("removed " + site, [&](BenchState s) { return RemoveLandmark(std::move(s), site); });
+  const std::string site = ReadText(json, "site");
+  bench.Apply("removed " + site, [&](BenchState s) { return RemoveLandmark(std::move(s), site); });
 }
 void Rename(Bench& bench, const Json& json) {
-  const std::string site = TextOf(json, "site"), name = TextOf(json, "name");
-  bench.Do(fmt::format("renamed {} to {}", site, name),
-           [&](BenchState s) { return RenameLandmark(std::move(s), site, name); });
+  const std::string site = ReadText(json, "site"), name = ReadText(json, "name");
+  bench.Apply(fmt::format("renamed {} to {}", site, name),
+              [&](BenchState s) { return RenameLandmark(std::move(s), site, name); });
 }
 void Absent(Bench& bench, const Json& json) {
-  const std::string site = TextOf(json, "site");
-  bench.Do("called " + site + " absent",
-           [&](BenchState s) { return CallAbsent(std::move(s), site, TextOf(json, "reason")); });
+  const std::string site = ReadText(json, "site");
+  bench.Apply("marked " + site + " absent", [&](BenchState s) {
+    return MarkAbsent(std::move(s), site, ReadText(json, "reason"));
+  });
 }
 void Remark(Bench& bench, const Json& json) {
-  const std::string site = TextOf(json, "site");
-  bench.Do("remarked on " + site,
-           [&](BenchState s) { return RemarkLandmark(std::move(s), site, RemarksOf(json)); });
+  const std::string site = ReadText(json, "site");
+  bench.Apply("remarked on " + site,
+              [&](BenchState s) { return RemarkLandmark(std::move(s), site, ReadRemarks(json)); });
 }
 void Confirm(Bench& bench, const Json& json) {
-  const std::string site = TextOf(json, "site");
-  bench.Do("confirmed " + site, [&](BenchState s) { return ConfirmLandmark(std::move(s), site); });
+  const std::string site = ReadText(json, "site");
+  bench.Apply("confirmed " + site,
+              [&](BenchState s) { return ConfirmLandmark(std::move(s), site); });
 }
 void ConfirmAll(Bench& bench, const Json&) {
-  bench.Do("confirmed all", [](BenchState s) { return ConfirmAllLandmarks(std::move(s)); });
+  bench.Apply("confirmed all", [](BenchState s) { return ConfirmAllLandmarks(std::move(s)); });
 }
 void ClearLandmarks(Bench& bench, const Json&) {
-  bench.Do("removed all landmarks", [](BenchState s) { return TakeLandmarks(std::move(s), {}); });
+  bench.Apply("removed all landmarks",
+              [](BenchState s) { return ReplaceLandmarks(std::move(s), {}); });
 }
-void Predicted(Bench& bench, const Json&) { bench.TakePredicted(); }
+void Predicted(Bench& bench, const Json&) { bench.AcceptPredicted(); }
 void Set(Bench& bench, const Json& json) {
-  const std::string path = TextOf(json, "path");
+  const std::string path = ReadText(json, "path");
   if (path == "subject.axes" || path == "subject.units") {
     bench.CorrectFrame(path, json.at("value").dump());
     return;
   }
-  bench.Do("set " + path, [&](BenchState s) {
+  bench.Apply("set " + path, [&](BenchState s) {
     return ChangeSetting(std::move(s), path, json.at("value").dump());
   });
 }
 void Unset(Bench& bench, const Json& json) {
-  const std::string path = TextOf(json, "path");
-  bench.Do("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
+  const std::string path = ReadText(json, "path");
+  bench.Apply("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
 }
-Pull PullOf(const Json& json) {
+Pull ReadPull(const Json& json) {
   return {.level = json_parts::IntFromJson(json.at("level")),
           .reach = json.at("reach").get<double>(),
           .mirror = json.at("mirror").get<bool>()};
 }
 void PullFace(Bench& bench, const Json& json) {
-  Pull pull = PullOf(json);
-  pull.by_mm = VectorOf(json, "by");
-  bench.PullAt(VectorOf(json, "at"), pull);
+  Pull pull = ReadPull(json);
+  pull.by_mm = ReadVector(json, "by");
+  bench.PullAt(ReadVector(json, "at"), pull);
 }
 void ClearEdits(Bench& bench, const Json&) {
-  bench.Do("took all edits back", [](BenchState s) { return TakeEdits(std::move(s), {}); });
+  bench.Apply("removed all edits", [](BenchState s) { return ReplaceEdits(std::move(s), {}); });
 }
 void Keep(Bench& bench, const Json& json) {
-  bench.KeepFeature(TextOf(json, "part"), TextOf(json, "name"));
+  bench.KeepFeature(ReadText(json, "part"), ReadText(json, "name"));
 }
 void Blend(Bench& bench, const Json& json) {
-  bench.BlendFeature(TextOf(json, "name"), json.at("weight").get<double>());
+  bench.BlendFeature(ReadText(json, "name"), json.at("weight").get<double>());
 }
-std::string TextOr(const Json& json, const char* key) {
-  return json.contains(key) && json.at(key).is_string() ? TextOf(json, key) : "";
-}
-template <class Enum>
-Enum WordOf(const Json& json, const char* key) {
-  constexpr auto kWords = EnumNames(Enum{});
-  const auto* const word = std::ranges::find(kWords, TextOf(json, key));
-  if (word == kWords.end()) {
-    throw InputError(fmt::format("{}: there is no '{}'", key, TextOf(json, key)));
-  }
-  return static_cast<Enum>(word - kWords.begin());
+// Empty if the key is missing.
+std::string ReadOptionalText(const Json& json, const char* key) {
+  return json.contains(key) && json.at(key).is_string() ? ReadText(json, key) : "";
 }
 void OpenFile(Bench& bench, const Json& json) {
   OpenRequest request{
-      .path = TextOf(json, "path"), .as = WordOf<OpenAs>(json, "as"), .volume = {}, .axes = {}};
+      .path = ReadText(json, "path"), .as = ReadEnum<OpenAs>(json, "as"), .volume = {}, .axes = {}};
   if (json.contains("volume")) {
     request.volume = ReadConfigText<CtSubject>(json.at("volume").dump(), "volume");
   }
-  if (!TextOr(json, "axes").empty()) {
-    request.axes = WordOf<Axes>(json, "axes");
+  if (!ReadOptionalText(json, "axes").empty()) {
+    request.axes = ReadEnum<Axes>(json, "axes");
   }
   bench.StartOpening(request);
 }
-void Forget(Bench& bench, const Json& json) { DropIncoming(bench.Folder(), TextOf(json, "batch")); }
+void Forget(Bench& bench, const Json& json) {
+  DropIncoming(bench.Folder(), ReadText(json, "batch"));
+}
 void MakeVariants(Bench& bench, const Json& json) {
   std::vector<BenchVariant> variants;
   for (const Json& name : json.at("variants")) {
-    variants.push_back(VariantCalled(name.get<std::string>()));
+    variants.push_back(FindVariant(name.get<std::string>()));
   }
   bench.StartVariants(variants);
 }
@@ -370,37 +376,37 @@ constexpr std::array<std::pair<std::string_view, Action>, 23> kActions = {
      {"cancel", &Cancel}}};
 
 BenchReply Act(Bench& bench, const BenchRequest& request) {
-  const Json json = BodyOf(request);
-  const std::string name = TextOf(json, "do");
+  const Json json = ParseBody(request);
+  const std::string name = ReadText(json, "do");
   const auto* const found =
       std::ranges::find(kActions, name, &decltype(kActions)::value_type::first);
   if (found == kActions.end()) {
-    return Fault(400, fmt::format("there is no action '{}'", name));
+    return ErrorReply(400, fmt::format("unknown action '{}'", name));
   }
   found->second(bench, json);
   return StateReply(bench);
 }
 
-// A file from the browser, until it is opened.
+// Stores a file from the browser until it is opened.
 BenchReply Upload(Bench& bench, const BenchRequest& request) {
   const fs::path path = SaveIncoming(bench.Folder(), QueryText(request, "batch"),
                                      QueryText(request, "name"), request.body);
   return JsonReply(Json{{"path", path.string()}}.dump());
 }
 
-// What a path of this machine is, or what the browser has sent in a batch.
-BenchReply LookAtPath(Bench& bench, const BenchRequest& request) {
-  const Json json = BodyOf(request);
-  const std::string batch = TextOr(json, "batch");
+// Identifies a path on this machine or the files of an uploaded batch.
+BenchReply Identify(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseBody(request);
+  const std::string batch = ReadOptionalText(json, "batch");
   const fs::path path =
-      batch.empty() ? fs::path(TextOf(json, "path")) : IncomingBatch(bench.Folder(), batch);
-  return JsonReply(BroughtJson(LookAtBrought(path)));
+      batch.empty() ? fs::path(ReadText(json, "path")) : IncomingBatch(bench.Folder(), batch);
+  return JsonReply(ImportedFileJson(IdentifyImport(path)));
 }
 
-// How each vertex goes with a pull: for the page to draw it while the pointer moves.
-BenchReply PullShape(Bench& bench, const BenchRequest& request) {
-  const Json json = BodyOf(request);
-  return JsonReply(PullMovesJson(bench.PullMovesAt(VectorOf(json, "at"), PullOf(json))));
+// The displacements of the shown vertices, for the preview of a pull.
+BenchReply PullPreview(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseBody(request);
+  return JsonReply(PullMovesJson(bench.PullMovesAt(ReadVector(json, "at"), ReadPull(json))));
 }
 
 BenchReply State(Bench& bench, const BenchRequest&) { return StateReply(bench); }
@@ -425,8 +431,8 @@ constexpr std::array kRoutes = {
     Route{"GET", "api/landmarks", &LandmarksFile},
     Route{"GET", "api/export", &FaceFile},
     Route{"POST", "api/act", &Act},
-    Route{"POST", "api/look", &LookAtPath},
-    Route{"POST", "api/pull", &PullShape},
+    Route{"POST", "api/look", &Identify},
+    Route{"POST", "api/pull", &PullPreview},
     Route{"POST", "api/upload", &Upload},
 };
 
@@ -435,11 +441,11 @@ BenchReply Find(Bench& bench, const BenchRequest& request) {
     if (route.path == request.path) {
       return route.method == request.method
                  ? route.handle(bench, request)
-                 : Fault(405, fmt::format("{} takes {}", route.path, route.method));
+                 : ErrorReply(405, fmt::format("{} takes {}", route.path, route.method));
     }
   }
   if (request.method != "GET") {
-    return Fault(404, "there is nothing to post to here");
+    return ErrorReply(404, "no address here takes POST");
   }
   constexpr std::string_view kRun = "run/";
   return request.path.starts_with(kRun) ? RunFile(bench, request.path.substr(kRun.size()))
@@ -452,19 +458,19 @@ BenchReply Answer(Bench& bench, const BenchRequest& request) {
   try {
     return Find(bench, request);
   } catch (const Error& error) {
-    return Refusal(error.what());
+    return RefusalReply(error.what());
   } catch (const BadRequest& error) {
-    return Fault(400, error.what());
+    return ErrorReply(400, error.what());
   } catch (const nlohmann::json::exception& error) {
-    return Fault(400, fmt::format("the request cannot be used: {}", JsonFault(error)));
+    return ErrorReply(400, fmt::format("the request is not valid: {}", JsonFault(error)));
   } catch (const Cancelled&) {
-    return Refusal("stopped");
+    return RefusalReply("stopped");
   } catch (const std::bad_alloc&) {
-    return Fault(507, "not enough memory");
+    return ErrorReply(507, "not enough memory");
   } catch (const fs::filesystem_error& error) {
-    return Refusal(fmt::format("a path: {}", error.code().message()));
+    return RefusalReply(fmt::format("a file cannot be used: {}", error.code().message()));
   } catch (const std::exception& error) {
-    return Fault(500, fmt::format("the work failed: {}", error.what()));
+    return ErrorReply(500, fmt::format("the work failed: {}", error.what()));
   }
 }
 

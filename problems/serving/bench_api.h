@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the page may ask of a workbench: a method, a path and a body, and the answer to them. Knows
-// no sockets.
+// The HTTP interface of a workbench without sockets: a request of the page (method, path, query,
+// body) and the reply to it.
 #pragma once
 
 #include <map>
@@ -20,13 +20,13 @@ struct BenchRequest {
 struct BenchReply {
   int status = 500;  // of HTTP
   std::string type = "text/plain; charset=utf-8";
-  std::string body = "not answered";
-  std::string download_name;  // where the browser is to keep it as a file
+  std::string body = "no reply";
+  std::string download_name;  // if the browser should save the body as a file
 };
 
-// Never throws. What is refused to a person is 200 with {"refused": words}, for the page to show:
-// no address of it answers so else. A request that the page does not make is 400, 404 or 405 with
-// {"error": words}; what failed in the program, 500 or 507.
+// Never throws. The page shows the reason of an impossible action: status 200 with {"refused":
+// words}, a key that no other reply has. A request that the page never makes gets 400, 404 or 405
+// with {"error": words}. A failure of the program gets 500 or 507.
 BenchReply Answer(Bench& bench, const BenchRequest& request);
 
 }  // namespace semblance

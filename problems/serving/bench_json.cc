@@ -24,7 +24,7 @@ Json Numbers(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
   Json json = {{"site", l.site},
                {"point", l.point},
-               {"certainty", EnumNames(l.certainty).at(static_cast<std::size_t>(l.certainty))},
+               {"certainty", EnumWord(l.certainty)},
                {"note", l.note},
                {"proposed", l.proposed}};
   json["depth_along_normal_mm"] = l.depth_along_normal_mm ? Json(*l.depth_along_normal_mm) : Json();
@@ -39,7 +39,7 @@ Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
 Json SubjectJson(const Bench::Snapshot& shot) {
   const BenchSubject& subject = *shot.subject;
   const auto& files = std::get<FileSubject>(shot.experiment.subject);
-  Json json = {{"name", Now(shot.history).subject},
+  Json json = {{"name", CurrentState(shot.history).subject},
                {"revision", shot.subject_revision},
                {"skull", files.skull.string()},
                {"skin", files.skin.string()},
@@ -53,7 +53,7 @@ Json SubjectJson(const Bench::Snapshot& shot) {
   return json;
 }
 
-const char* WordOf(JobState state) {
+const char* JobWord(JobState state) {
   switch (state) {
     case JobState::kRunning:
       return "running";
@@ -70,7 +70,7 @@ const char* WordOf(JobState state) {
 
 Json JobJson(const JobStatus& job) {
   return {{"name", job.name},
-          {"state", WordOf(job.state)},
+          {"state", JobWord(job.state)},
           {"step", job.step},
           {"fraction", Number(job.fraction)},
           {"seconds", Number(job.seconds)},
@@ -121,7 +121,7 @@ Json SiteJson(const Site& site) {
 }  // namespace
 
 std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::path& folder) {
-  const BenchState& state = Now(shot.history);
+  const BenchState& state = CurrentState(shot.history);
   Json json = {{"revision", shot.revision},
                {"folder", folder.string()},
                {"subject", SubjectJson(shot)},
@@ -142,7 +142,7 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
                  {"revision", shot.face_revision}}},
                {"variants", Json::array()}};
   for (const BenchVariant variant : shot.variants) {
-    json["variants"].push_back(NameOf(variant));
+    json["variants"].push_back(VariantName(variant));
   }
   for (const BenchLandmark& landmark : state.landmarks) {
     json["landmarks"].push_back(LandmarkJson(landmark, shot.checks));
@@ -181,13 +181,13 @@ std::string PullMovesJson(const std::array<std::vector<Vec3>, 3>& moves) {
   return json.dump();
 }
 
-std::string BroughtJson(const Brought& brought) {
-  Json json = {{"kind", EnumNames(brought.kind).at(static_cast<std::size_t>(brought.kind))},
-               {"path", brought.path.string()},
-               {"name", brought.path.filename().string()},
+std::string ImportedFileJson(const ImportedFile& file) {
+  Json json = {{"kind", EnumWord(file.kind)},
+               {"path", file.path.string()},
+               {"name", file.path.filename().string()},
                {"ways", Json::array()}};
-  for (const OpenAs as : WaysToOpen(brought.kind)) {
-    json["ways"].push_back(EnumNames(as).at(static_cast<std::size_t>(as)));
+  for (const OpenAs as : WaysToOpen(file.kind)) {
+    json["ways"].push_back(EnumWord(as));
   }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the page is told, as JSON.
+// JSON texts for the page.
 #pragma once
 
 #include <array>
@@ -11,24 +11,26 @@
 
 namespace semblance {
 
-// Landmarks with their checks, settings, values of all options, what can be undone, the job.
+// Landmarks with their checks, settings, values of all options, the steps that undo and redo reach,
+// and the job.
 std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::path& folder);
 
-// {mesh: {blobs of view_mesh.h}, dowels, notes, finest_level, seconds}: null but of a coarse one.
+// {mesh: {blobs of view_mesh.h}, dowels, notes, finest_level, seconds}. seconds is null for a full
+// face.
 std::string FaceJson(const BenchFace& face);
 
-// {per_mm: three for pulls along x, y and z, each with the x, y and z of the vertices' ways as
-// blobs of values}, in hundredths of the pull.
+// {per_mm: [px, py, pz]}, for pulls of 1 mm along x, y and z. Each is an array of three blobs, the
+// x, y and z components of the vertices' displacements in hundredths of a mm.
 std::string PullMovesJson(const std::array<std::vector<Vec3>, 3>& moves);
 
-// {kind, path, name, ways}: what was brought, and as what it can be opened.
-std::string BroughtJson(const Brought& brought);
+// {kind, path, name, ways}, with the roles in which the file can be opened.
+std::string ImportedFileJson(const ImportedFile& file);
 
-// {skull, skin}: blobs, null where there is none.
+// {skull, skin}: blobs, or null for a missing mesh.
 std::string MeshesJson(const BenchSubject& subject);
 
-// Every site: code, name, number, partner, its place on the bone in words, and where it lies on a
-// phantom's skull, for the picture.
+// Every site: code, name, number, partner and definition; standard sites with their position on the
+// average skull.
 std::string SitesJson();
 
 }  // namespace semblance

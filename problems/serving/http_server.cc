@@ -24,11 +24,11 @@ namespace {
 
 constexpr const char* kHost = "127.0.0.1";
 
-// The page takes nothing from anywhere else, and nobody frames it.
+// The page loads nothing from other addresses, and no other page may embed it in a frame.
 constexpr const char* kPagePolicy =
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
     "connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
-// A report carries its scripts in itself; it gets an origin of its own.
+// A report contains its scripts. The sandbox gives it a separate origin.
 constexpr const char* kReportPolicy =
     "sandbox allow-scripts allow-downloads; default-src 'none'; script-src 'unsafe-inline'; "
     "style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; form-action 'none'";
@@ -42,7 +42,7 @@ struct Refusal {
   const char* words;
 };
 
-std::optional<std::uint64_t> NumberOf(const std::string& text) {
+std::optional<std::uint64_t> ParseNumber(const std::string& text) {
   std::uint64_t number = 0;
   const char* const end = text.data() + text.size();
   const auto [at, error] = std::from_chars(text.data(), end, number);
@@ -75,7 +75,7 @@ struct HttpServer::Impl {
     return origin.starts_with(kScheme) && IsOwnHost(origin.substr(kScheme.size()));
   }
 
-  // "/TOKEN/rest": the rest; none for another token.
+  // Returns "rest" of "/TOKEN/rest", or none for another token.
   std::optional<std::string> BelowToken(const std::string& path) const {
     const std::size_t slash = path.find('/', 1);
     const bool fits = path.size() > 1 && slash != std::string::npos &&
@@ -85,21 +85,21 @@ struct HttpServer::Impl {
 
   std::optional<Refusal> CheckBody(const httplib::Request& request, const std::string& path) const {
     const bool is_upload = path == "api/upload";
-    const auto size = NumberOf(request.get_header_value("Content-Length"));
+    const auto size = ParseNumber(request.get_header_value("Content-Length"));
     if (!size || request.has_header("Transfer-Encoding")) {
-      return Refusal{411, "say how long the body is"};
+      return Refusal{411, "a POST needs the header Content-Length"};
     }
-    if (*size > (is_upload ? options.most_upload_bytes : options.most_bytes)) {
+    if (*size > (is_upload ? options.max_upload_bytes : options.max_body_bytes)) {
       return Refusal{413, "the body is too large"};
     }
     const std::string type = request.get_header_value("Content-Type");
     if (type != (is_upload ? "application/octet-stream" : "application/json")) {
-      return Refusal{415, "the body is of another type than this address takes"};
+      return Refusal{415, "this address takes another Content-Type"};
     }
     return std::nullopt;
   }
 
-  // Why the request is not answered; none if it is.
+  // Returns the reason to refuse the request, or none.
   std::optional<Refusal> Check(const httplib::Request& request) const {
     if (request.get_header_value_count("Host") != 1 ||
         !IsOwnHost(request.get_header_value("Host"))) {
@@ -121,8 +121,8 @@ struct HttpServer::Impl {
     return posts ? CheckBody(request, *path) : std::nullopt;
   }
 
-  // As it is: a body that is set as content would be compressed with Brotli, which takes a browser
-  // on this machine longer than making the face does.
+  // Sends the body uncompressed. httplib would compress a body set as content with Brotli, which
+  // takes a browser on this machine longer than making the face does.
   static void SetBody(httplib::Response& response, const std::string& text,
                       const std::string& type) {
     const auto body = std::make_shared<const std::string>(text);
@@ -134,13 +134,13 @@ struct HttpServer::Impl {
   }
 
   void Reply(const httplib::Request& request, httplib::Response& response) {
-    BenchRequest asked{request.method, *BelowToken(request.path), {}, request.body};
+    BenchRequest bench_request{request.method, *BelowToken(request.path), {}, request.body};
     for (const auto& [key, value] : request.params) {
-      asked.query[key] = value;
+      bench_request.query[key] = value;
     }
-    const BenchReply reply = Answer(bench, asked);
+    const BenchReply reply = Answer(bench, bench_request);
     response.status = reply.status;
-    if (asked.path.starts_with("run/")) {
+    if (bench_request.path.starts_with("run/")) {
       response.headers.erase("Content-Security-Policy");
       response.set_header("Content-Security-Policy", kReportPolicy);
     }
@@ -153,9 +153,10 @@ struct HttpServer::Impl {
 
   void Prepare() {
     server.set_keep_alive_max_count(1000);
-    server.set_tcp_nodelay(true);  // head and body are written apart: the rest of a body would wait
+    // httplib writes head and body separately, so that the rest of a body would wait otherwise.
+    server.set_tcp_nodelay(true);
     server.set_read_timeout(10, 0);
-    server.set_payload_max_length(options.most_upload_bytes);
+    server.set_payload_max_length(options.max_upload_bytes);
     server.set_default_headers({{"Content-Security-Policy", kPagePolicy},
                                 {"X-Content-Type-Options", "nosniff"},
                                 {"Referrer-Policy", "no-referrer"},
@@ -183,8 +184,7 @@ struct HttpServer::Impl {
                                            : server.bind_to_port(kHost, options.port);
     if (!listens) {
       throw IoError(
-          fmt::format("port {} of {} cannot be listened on; it may be taken: give another "
-                      "--port, or none",
+          fmt::format("port {} of {} cannot be used; it may be taken: give another --port, or none",
                       options.port, kHost));
     }
     port = options.port == 0 ? port : options.port;
@@ -209,14 +209,14 @@ std::string HttpServer::Url() const {
 }
 
 void HttpServer::Serve(const std::stop_token& stop) {
-  constexpr std::chrono::milliseconds kLook(20);
+  constexpr std::chrono::milliseconds kStopCheck(20);
   auto listening = std::async(std::launch::async, [this] { impl_->server.listen_after_bind(); });
-  bool is_asked = false;
-  while (listening.wait_for(kLook) != std::future_status::ready) {
-    // Of a server that does not run yet, stop() would be lost.
-    if (!is_asked && stop.stop_requested() && impl_->server.is_running()) {
+  bool stop_sent = false;
+  while (listening.wait_for(kStopCheck) != std::future_status::ready) {
+    // stop() has no effect on a server that does not run yet.
+    if (!stop_sent && stop.stop_requested() && impl_->server.is_running()) {
       impl_->server.stop();
-      is_asked = true;
+      stop_sent = true;
     }
   }
   listening.get();
@@ -225,7 +225,7 @@ void HttpServer::Serve(const std::stop_token& stop) {
 std::string RandomToken() {
   std::array<unsigned char, 32> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    throw IoError("the system gives no random numbers; the workbench needs some for its address");
+    throw IoError("the system gives no random numbers, which the workbench needs for its address");
   }
   std::string token;
   for (const unsigned char byte : bytes) {

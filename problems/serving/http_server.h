@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The one thing of the program that listens: on the loopback address of this machine, for one
+// The only server of the program. It listens on the loopback address of this machine, for one
 // person who has the URL.
 #pragma once
 
@@ -13,18 +13,18 @@
 namespace semblance {
 
 struct HttpServerOptions {
-  int port = 0;                               // of 127.0.0.1; 0: any that is free
-  std::string token;                          // first part of every path; empty: a new random one
-  std::size_t most_bytes = 1 << 20;           // of a request's body
-  std::size_t most_upload_bytes = 512 << 20;  // of a file from the browser
+  int port = 0;                              // of 127.0.0.1; 0: any free port
+  std::string token;                         // first part of every path; empty: a new random one
+  std::size_t max_body_bytes = 1 << 20;      // limit of a request's body
+  std::size_t max_upload_bytes = 512 << 20;  // limit of a file from the browser
 };
 
-// Every request must carry the token in its path (compared in constant time), this machine as its
-// Host and, where the browser tells one, this page as its Origin; what is posted must tell it. All
-// else is refused before its body is read.
+// Every request must have the token in its path (compared in constant time), this machine as its
+// Host and, if it has an Origin, this page as its Origin. A POST must have an Origin. The server
+// refuses any other request before it reads the body.
 class HttpServer {
  public:
-  // Listens from now on. Throws IoError if the port is taken.
+  // Starts to listen. Throws IoError if the port is taken.
   HttpServer(Bench& bench, const HttpServerOptions& options = {});
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
@@ -33,7 +33,7 @@ class HttpServer {
   int Port() const;
   std::string Url() const;  // with the token
 
-  // Answers until a stop is asked for, be it before it begins.
+  // Answers requests until a stop is requested. A stop requested before the call counts too.
   void Serve(const std::stop_token& stop);
 
  private:
@@ -41,7 +41,8 @@ class HttpServer {
   std::unique_ptr<Impl> impl_;
 };
 
-// 64 hexadecimal digits from the system's source of random numbers. Throws IoError without one.
+// 64 hexadecimal digits from the system's source of random numbers. Throws IoError if the system
+// has no such source.
 std::string RandomToken();
 
 }  // namespace semblance

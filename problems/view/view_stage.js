@@ -107,7 +107,7 @@ class SemblanceStage {
         const end = tip.clone().lerp(vector(dowel.on_face), exaggeration);
         parts.push(cylinder(tip, end, 0.7, this.material.residual), ball(end, 0.9, this.material.residual));
       }
-      const residual = dowel.on_face ? `, face ${dowel.residual_mm.toFixed(2)} mm off` : dowel.fitted === 'not told' ? '' : ', not fitted';
+      const residual = dowel.on_face ? `, face ${dowel.residual_mm.toFixed(2)} mm off` : dowel.fitted === 'unknown' ? '' : ', not fitted';
       for (const part of parts) {
         part.userData.text = `${dowel.name || `depth marker ${dowel.site}`}: depth ${dowel.depth_mm.toFixed(2)} mm${residual}`;
         object.add(part);

@@ -16,8 +16,6 @@
 #include "problems/report/run_folder.h"
 #include "problems/workbench/bench_actions.h"
 #include "problems/workbench/bench_config.h"
-#include "problems/workbench/bench_incoming.h"
-#include "problems/workbench/bench_pull.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
@@ -32,18 +30,20 @@ using Lock = std::lock_guard<std::mutex>;
 
 constexpr const char* kBeforeEdits = "face_before_edits.hspline.json";
 constexpr const char* kRunKey = "run_key.txt";
-constexpr int kStages = 12;
+// Number of kept intermediate results of runs: the stages of the present run and those of its
+// variants that differ. Fewer values make variants repeat stages, more cost memory.
+constexpr int kRunStages = 12;
 
-const FileSubject& FilesOf(const Experiment& experiment) {
+const FileSubject& SubjectFiles(const Experiment& experiment) {
   const auto* files = std::get_if<FileSubject>(&experiment.subject);
   if (files == nullptr) {
     throw InputError(
-        "subject.type: the workbench holds its subject in files; open another one by its file");
+        "subject.type: the workbench keeps its subject in files; open another subject by its file");
   }
   return *files;
 }
 
-// All that the meshes depend on.
+// Text of all options that the meshes depend on.
 std::string SubjectKey(const FileSubject& subject) {
   FileSubject meshes = subject;
   meshes.landmarks.clear();
@@ -58,8 +58,8 @@ std::vector<ReferenceHead> ReadReferences(const BenchOptions& options) {
   return heads;
 }
 
-// All that a face depends on, edits apart.
-std::string KeyOfRun(Experiment experiment, const BenchState& state, const fs::path& folder) {
+// Text of all that a face depends on, without the edits.
+std::string RunKey(Experiment experiment, const BenchState& state, const fs::path& folder) {
   experiment.edits.clear();
   return ShortConfig(experiment, folder) + LandmarksText(state);
 }
@@ -75,9 +75,10 @@ Bench::Bench(const BenchOptions& options)
   const RunContext context = Context();
   if (folder_.HasWork()) {
     if (!options.source.empty()) {
-      throw InputError(fmt::format(
-          "{}: it holds the work of a workbench; open it without {}, or give another --out",
-          folder_.Root().string(), options.source.string()));
+      throw InputError(
+          fmt::format("{}: this folder holds the work of a workbench; open it without {}, or give "
+                      "another --out",
+                      folder_.Root().string(), options.source.string()));
     }
     DropAllIncoming(folder_.Root());
     history_ = folder_.Read();
@@ -87,9 +88,9 @@ Bench::Bench(const BenchOptions& options)
     folder_.Begin(StartConfig(beginning.experiment, folder_.Root()), beginning.state);
     history_ = BeginHistory(beginning.state);
   }
-  Take(history_, /*keeps_run=*/true);
-  FindFormerRun();
-  FindFormerVariants();
+  Commit(history_, /*by_job=*/true);
+  LoadStoredRun();
+  LoadStoredVariants();
 }
 
 Bench::~Bench() { job_.Stop(); }
@@ -100,43 +101,44 @@ RunContext Bench::Context() const {
   return context;
 }
 
-// The one place where the state changes: first all that may fail, then the files, then the rest.
-void Bench::Take(BenchHistory history, bool keeps_run) {
-  Experiment experiment = folder_.ExperimentOf(Now(history));
-  LoadSubjectOf(experiment, Context());
-  const bool same_landmarks = SameLandmarks(Now(history), Now(history_));
+// The only place where the state changes, invariant (1). by_job: the step comes from the running
+// job, which must not cancel itself.
+void Bench::Commit(BenchHistory history, bool by_job) {
+  const BenchState& state = CurrentState(history);
+  Experiment experiment = folder_.ReadExperiment(state);
+  const FileSubject& files = SubjectFiles(experiment);
+  std::string subject_key = SubjectKey(files);
+  const bool is_new_subject = !subject_ || subject_key != subject_key_;
+  auto subject = is_new_subject
+                     ? std::make_shared<const BenchSubject>(LoadBenchSubject(files, Context()))
+                     : subject_;
+  LandmarkChecks checks = subject->bone ? CheckLandmarks(ToLandmarkFile(state), subject->skull.mesh,
+                                                         *subject->bone, experiment.landmarks)
+                                        : LandmarkChecks();
+  std::string present_key = RunKey(experiment, state, folder_.Root());
+  std::shared_ptr<StageCache> stages =
+      is_new_subject || !SameLandmarks(state, CurrentState(history_))
+          ? std::make_shared<StageCache>(kRunStages)
+          : run_stages_;
   folder_.Write(history, experiment);
-  if (!keeps_run) {
+  if (!by_job) {
     job_.Cancel();
   }
-  if (!same_landmarks || !run_stages_) {
-    run_stages_ = std::make_shared<StageCache>(kStages);
-  }
-  present_key_ = KeyOfRun(experiment, Now(history), folder_.Root());
   history_ = std::move(history);
   experiment_ = std::move(experiment);
-  checks_ = subject_->bone ? CheckLandmarks(LandmarksOf(Now(history_)), subject_->skull.mesh,
-                                            *subject_->bone, experiment_.landmarks)
-                           : LandmarkChecks();
+  subject_ = std::move(subject);
+  subject_key_ = std::move(subject_key);
+  checks_ = std::move(checks);
+  present_key_ = std::move(present_key);
+  run_stages_ = std::move(stages);
+  subject_revision_ += is_new_subject ? 1 : 0;
   ++revision_;
 }
 
-void Bench::LoadSubjectOf(const Experiment& experiment, const RunContext& context) {
-  const FileSubject& files = FilesOf(experiment);
-  const std::string key = SubjectKey(files);
-  if (subject_ && key == subject_key_) {
-    return;
-  }
-  subject_ = std::make_shared<const BenchSubject>(LoadBenchSubject(files, context));
-  subject_key_ = key;
-  run_stages_.reset();
-  ++subject_revision_;
-}
-
-// A run of the present state that another workbench has left.
-void Bench::FindFormerRun() {
+// Loads the face of an earlier workbench if it belongs to the present state, invariant (5).
+void Bench::LoadStoredRun() {
   const fs::path key = folder_.Root() / kRunKey, face = folder_.Root() / kBeforeEdits;
-  const BenchState& state = Now(history_);
+  const BenchState& state = CurrentState(history_);
   if (!fs::exists(key) || !fs::exists(face)) {
     return;
   }
@@ -149,31 +151,32 @@ void Bench::FindFormerRun() {
   }
 }
 
-// All that the variants' faces depend on.
-std::string Bench::KeyOfVariants() const {
-  return Sha256OfText(present_key_ + EditsText(Now(history_)));
+// Hash of all that the variants' faces depend on.
+std::string Bench::VariantsKey() const {
+  return Sha256OfText(present_key_ + EditsText(CurrentState(history_)));
 }
 
-Experiment Bench::ExperimentOfVariant(BenchVariant variant) const {
+Experiment Bench::MakeVariantExperiment(BenchVariant variant) const {
   const std::vector<Dowel> dowels =
-      CoarseCase(*subject_, experiment_, Now(history_)).dowels_on_bone;
-  return VariantOf(folder_.ExperimentAsSaved(), variant, dowels, kUsualSd_mm);
+      CoarseCase(*subject_, experiment_, CurrentState(history_)).dowels_on_bone;
+  return VariantExperiment(folder_.ReadSavedExperiment(), variant, dowels, kUsualSd_mm);
 }
 
 bool Bench::HasVariant(BenchVariant variant) const {
   const auto at = variants_.find(variant);
-  return at != variants_.end() && at->second.key == KeyOfVariants();
+  return at != variants_.end() && at->second.key == VariantsKey();
 }
 
-void Bench::FindFormerVariants() {
+void Bench::LoadStoredVariants() {
   if (subject_->bone && fs::exists(folder_.Root() / "variants")) {
-    variants_ = StoredVariants(folder_.Root(), KeyOfVariants(), [this](BenchVariant variant) {
-      return CoarseCase(*subject_, ExperimentOfVariant(variant), Now(history_)).dowels_on_bone;
+    variants_ = StoredVariants(folder_.Root(), VariantsKey(), [this](BenchVariant variant) {
+      return CoarseCase(*subject_, MakeVariantExperiment(variant), CurrentState(history_))
+          .dowels_on_bone;
     });
   }
 }
 
-Bench::Snapshot Bench::Look() const {
+Bench::Snapshot Bench::TakeSnapshot() const {
   const Lock lock(mutex_);
   Snapshot shot{.revision = revision_,
                 .subject_revision = subject_revision_,
@@ -186,9 +189,9 @@ Bench::Snapshot Bench::Look() const {
     shot.has_face = true;
     shot.face_revision = face_revision_;
     shot.face_fresh = face_->key == present_key_;
-    shot.run_saved = shot.face_fresh && face_->edits == EditsText(Now(history_));
+    shot.run_saved = shot.face_fresh && face_->edits == EditsText(CurrentState(history_));
   }
-  const std::string key = variants_.empty() ? "" : KeyOfVariants();
+  const std::string key = variants_.empty() ? "" : VariantsKey();
   for (const auto& [variant, made] : variants_) {
     if (made.key == key) {
       shot.variants.push_back(variant);
@@ -197,24 +200,24 @@ Bench::Snapshot Bench::Look() const {
   return shot;
 }
 
-void Bench::Do(const std::string& what, const std::function<BenchState(BenchState)>& action) {
+void Bench::Apply(const std::string& what, const std::function<BenchState(BenchState)>& action) {
   const Lock lock(mutex_);
-  Take(Done(history_, what, action(Now(history_))));
+  Commit(AddStep(history_, what, action(CurrentState(history_))));
 }
 
 void Bench::Undo() {
   const Lock lock(mutex_);
-  Take(Undone(history_));
+  Commit(Undone(history_));
 }
 
 void Bench::Redo() {
   const Lock lock(mutex_);
-  Take(Redone(history_));
+  Commit(Redone(history_));
 }
 
 void Bench::PlaceByRay(const std::string& site, const Vec3& origin, const Vec3& direction,
                        const Vec3& near) {
-  constexpr double kFar_mm = 1e5;
+  constexpr double kFar_mm = 1e5;  // beyond any head that the camera shows
   const Lock lock(mutex_);
   if (!subject_->bone) {
     throw InputError("landmarks: there is no skull yet; open one first");
@@ -224,53 +227,57 @@ void Bench::PlaceByRay(const std::string& site, const Vec3& origin, const Vec3& 
   }
   const auto hit = subject_->bone->FirstHit(origin, direction, kFar_mm);
   const Vec3 point = hit ? hit->position : subject_->bone->Closest(near).position;
-  Take(Done(history_, "placed " + site, PlaceLandmark(Now(history_), site, point)));
+  Commit(AddStep(history_, "placed " + site, PlaceLandmark(CurrentState(history_), site, point)));
 }
 
-void Bench::TakePredicted() {
+void Bench::AcceptPredicted() {
   const Lock lock(mutex_);
   if (checks_.predicted.empty()) {
     throw InputError(
-        "landmarks: none is predicted; place three or more that do not lie on a line, on a head in "
-        "mm and LPS");
+        "landmarks: no site is predicted; place three or more that do not lie on a line, on a head "
+        "in mm and LPS");
   }
-  Take(Done(history_, "suggested the other landmarks",
-            TakeProposals(Now(history_), PredictedLandmarks(checks_))));
+  Commit(AddStep(history_, "suggested the other landmarks",
+                 AddProposals(CurrentState(history_), PredictedLandmarks(checks_))));
 }
 
 const RunFace& Bench::FreshFace() const {
   if (!face_ || face_->key != present_key_) {
-    throw InputError("the face is sculpted after a full run of the present choices; run first");
+    throw InputError(
+        "sculpting needs a full face of the present options and landmarks; make the full face "
+        "first");
   }
   return *face_;
 }
 
 void Bench::CorrectFrame(const std::string& path, const std::string& value) {
   const Lock lock(mutex_);
-  BenchState state = ChangeSetting(Now(history_), path, value);
-  const FileSubject before = FilesOf(experiment_), after = FilesOf(folder_.ExperimentOf(state));
+  BenchState state = ChangeSetting(CurrentState(history_), path, value);
+  const FileSubject before = SubjectFiles(experiment_),
+                    after = SubjectFiles(folder_.ReadExperiment(state));
   std::vector<std::string> on_bone;
   for (const auto& [site, check] : checks_.sites) {
     if (check.from_bone_mm <= experiment_.landmarks.max_distance_mm) {
       on_bone.push_back(site);
     }
   }
-  state = InOtherFrame(std::move(state), on_bone, before, after);
-  Take(Done(history_, "set " + path, std::move(state)));
+  state = ChangeFrame(std::move(state), on_bone, before, after);
+  Commit(AddStep(history_, "set " + path, std::move(state)));
 }
 
 HSplineSurface Bench::Edited(const RunFace& face) const {
   HSplineSurface surface = face.before_edits;
-  ApplyEdits(Now(history_).edits, surface);
+  ApplyEdits(CurrentState(history_).edits, surface);
   return surface;
 }
 
 void Bench::PullAt(const Vec3& at, Pull pull) {
   const Lock lock(mutex_);
   const HSplineSurface surface = Edited(FreshFace());
-  pull.uv = HeldParameter(surface, at);
-  Take(Done(history_, fmt::format("pulled level {} by {:.1f} mm", pull.level, pull.by_mm.norm()),
-            TakeEdits(Now(history_), Pulled(pull, surface, Now(history_).edits))));
+  pull.uv = NearestParameter(surface, at);
+  Commit(AddStep(
+      history_, fmt::format("pulled level {} by {:.1f} mm", pull.level, pull.by_mm.norm()),
+      ReplaceEdits(CurrentState(history_), Pulled(pull, surface, CurrentState(history_).edits))));
 }
 
 std::array<std::vector<Vec3>, 3> Bench::PullMovesAt(const Vec3& at, Pull pull) const {
@@ -278,7 +285,7 @@ std::array<std::vector<Vec3>, 3> Bench::PullMovesAt(const Vec3& at, Pull pull) c
     const Lock lock(mutex_);
     return Edited(FreshFace());
   }();
-  pull.uv = HeldParameter(surface, at);
+  pull.uv = NearestParameter(surface, at);
   return PullMoves(surface, pull, kShownQuadsPerPatch);
 }
 
@@ -314,11 +321,11 @@ void Bench::KeepFeature(const std::string& part, const std::string& name) {
                                 [&] { return LoadTemplate(experiment_.face_template); });
   const auto found = std::ranges::find(generic->features, part, &TemplateFeature::name);
   if (found == generic->features.end()) {
-    throw InputError(fmt::format("features: the generic face has no part '{}'", part));
+    throw InputError(fmt::format("features: the template has no part '{}'", part));
   }
   const Feature feature = ExtractFeature(surface, name, std::span<const VertexId>(found->vertices));
   if (fs::exists(folder_.Root() / "features" / (name + ".json"))) {
-    throw InputError(fmt::format("features: '{}' is there already; give another name", name));
+    throw InputError(fmt::format("features: '{}' exists already; give another name", name));
   }
   StoreFeature(folder_.Root() / "features", feature);
   ++revision_;
@@ -340,19 +347,20 @@ void Bench::BlendFeature(const std::string& name, double weight) {
   const Feature blend =
       BlendFeatures(name, std::vector{own, found->second}, std::vector{1 - weight, weight}).feature;
   HSplineSurface tried = own_face;
-  ApplyFeature(blend, tried);  // whether it fits this face
+  ApplyFeature(blend, tried);  // throws if the feature does not fit this face
   std::map<VertexId, std::optional<Vec3>> offsets(blend.offsets.begin(), blend.offsets.end());
-  Take(Done(history_, fmt::format("blended {:.0f} % of {}", 100 * weight, name),
-            TakeEdits(Now(history_), WithOffsets(Now(history_).edits, offsets))));
+  Commit(AddStep(
+      history_, fmt::format("blended {:.0f} % of {}", 100 * weight, name),
+      ReplaceEdits(CurrentState(history_), WithOffsets(CurrentState(history_).edits, offsets))));
 }
 
-// What was tried out is asked for again once it is kept.
-BenchFace Bench::CoarseOf(const BenchSubject& subject, const Experiment& experiment,
-                          const BenchState& state) const {
+// Cached, because the page requests a tried option again once a person keeps it.
+BenchFace Bench::MakeCoarse(const BenchSubject& subject, const Experiment& experiment,
+                            const BenchState& state) const {
   if (!subject.bone) {
     throw InputError("there is no skull yet; open one first");
   }
-  const std::string key = KeyOfRun(experiment, state, folder_.Root()) + EditsText(state);
+  const std::string key = RunKey(experiment, state, folder_.Root()) + EditsText(state);
   return *coarse_.Get<BenchFace>(key, [&] {
     const auto start = std::chrono::steady_clock::now();
     BenchFace face = CoarseFace(subject, experiment, state, models_, Context());
@@ -369,12 +377,13 @@ BenchFace Bench::Coarse(BenchVariant variant) const {
     const Lock lock(mutex_);
     subject = subject_;
     experiment = experiment_;
-    state = Now(history_);
+    state = CurrentState(history_);
   }
-  BenchFace face = CoarseOf(*subject, experiment, state);
+  BenchFace face = MakeCoarse(*subject, experiment, state);
   return variant == BenchVariant::kAsIs
              ? face
-             : CoarseOf(*subject, VariantOf(experiment, variant, face.dowels, kUsualSd_mm), state);
+             : MakeCoarse(*subject,
+                          VariantExperiment(experiment, variant, face.dowels, kUsualSd_mm), state);
 }
 
 BenchFace Bench::CoarseWith(const BenchSetting& setting) const {
@@ -383,9 +392,9 @@ BenchFace Bench::CoarseWith(const BenchSetting& setting) const {
   {
     const Lock lock(mutex_);
     subject = subject_;
-    state = ChangeSetting(Now(history_), setting.path, setting.value);
+    state = ChangeSetting(CurrentState(history_), setting.path, setting.value);
   }
-  return CoarseOf(*subject, folder_.ExperimentOf(state), state);
+  return MakeCoarse(*subject, folder_.ReadExperiment(state), state);
 }
 
 BenchFace Bench::Full() const {
@@ -400,15 +409,15 @@ BenchFace Bench::FullVariant(BenchVariant variant) const {
   const Lock lock(mutex_);
   if (!HasVariant(variant)) {
     throw InputError(
-        fmt::format("variants: the full face of '{}' is not made yet", NameOf(variant)));
+        fmt::format("variants: the full face of '{}' does not exist yet", VariantName(variant)));
   }
   return variants_.at(variant).face;
 }
 
-// The run's own face where that is meant, and is there.
+// The face of the run if the variant is kAsIs and that face is fresh.
 std::optional<BenchFace> Bench::FaceAsIs(BenchVariant variant) const {
-  const bool is_there = variant == BenchVariant::kAsIs && face_ && face_->key == present_key_;
-  return is_there ? std::optional(BenchFace{Edited(*face_), face_->dowels, face_->notes})
+  const bool is_fresh = variant == BenchVariant::kAsIs && face_ && face_->key == present_key_;
+  return is_fresh ? std::optional(BenchFace{Edited(*face_), face_->dowels, face_->notes})
                   : std::nullopt;
 }
 
@@ -422,24 +431,24 @@ void Bench::MakeVariant(BenchVariant variant, int revision, const RunContext& co
       return;
     }
     stages = run_stages_;
-    experiment = ExperimentOfVariant(variant);
+    experiment = MakeVariantExperiment(variant);
     face = FaceAsIs(variant);
   }
   if (!face) {
-    const RunResult result = semblance::Run(experiment, context, stages.get());
+    const RunResult result = Run(experiment, context, stages.get());
     face = {result.fit.surface, result.subject.dowels_on_bone, result.subject.notes};
   }
   const Lock lock(mutex_);
   if (revision != revision_) {
     throw Cancelled();
   }
-  const VariantFace made{*std::move(face), KeyOfVariants()};
+  const VariantFace made{*std::move(face), VariantsKey()};
   StoreVariant(folder_.Root(), variant, made);
   variants_.insert_or_assign(variant, made);
 }
 
-// In place of what runs. That is waited for without the lock, which its last step may need; and
-// nobody else starts anything meanwhile.
+// Replaces the running job. It waits for that job without mutex_, because the job's last step may
+// need it. starting_ keeps other threads from starting a job meanwhile.
 void Bench::StartJob(const std::string& name, const std::function<Work()>& prepare) {
   const Lock starting(starting_);
   job_.Stop();
@@ -458,8 +467,8 @@ std::string Bench::MakeVariants(const std::vector<BenchVariant>& variants, int r
   for (std::size_t k = 0; k < variants.size(); ++k) {
     RunContext inner = context;
     inner.on_event = [&, k](Event event) {
-      event.step =
-          fmt::format("{} ({} of {}), {}", NameOf(variants[k]), k + 1, variants.size(), event.step);
+      event.step = fmt::format("{} ({} of {}), {}", VariantName(variants[k]), k + 1,
+                               variants.size(), event.step);
       context.on_event(event);
     };
     MakeVariant(variants[k], revision, inner);
@@ -476,22 +485,22 @@ void Bench::StartVariants(const std::vector<BenchVariant>& variants) {
   });
 }
 
-RunFace Bench::FinishRun(const Experiment& experiment, const RunContext& context, int revision) {
+RunFace Bench::MakeRun(const Experiment& experiment, const RunContext& context, int revision) {
   std::shared_ptr<StageCache> stages;
   {
     const Lock lock(mutex_);
     stages = run_stages_;
   }
-  const RunResult result = semblance::Run(experiment, context, stages.get());
+  const RunResult result = Run(experiment, context, stages.get());
   StagedFolder staged(folder_.Root() / "run", WhenNotEmpty::kReplaceFiles);
   WriteRun(experiment, result, staged.Files(), context);
   const Lock lock(mutex_);
   if (revision != revision_) {
-    throw Cancelled();  // the files that it has read may have changed under it
+    throw Cancelled();  // the state has changed since the run read its files
   }
   staged.Publish();
   RunFace face{result.before_edits.value_or(result.fit.surface), result.subject.dowels_on_bone,
-               result.subject.notes, present_key_, EditsText(Now(history_))};
+               result.subject.notes, present_key_, EditsText(CurrentState(history_))};
   WriteHSpline(folder_.Root() / kBeforeEdits, face.before_edits);
   WriteFileAtomically(folder_.Root() / kRunKey, Sha256OfText(face.key + face.edits));
   face_ = face;
@@ -506,9 +515,9 @@ void Bench::CancelJob() {
 
 void Bench::StartRun() {
   StartJob("run", [&] {
-    return [this, experiment = folder_.ExperimentAsSaved(),
+    return [this, experiment = folder_.ReadSavedExperiment(),
             revision = revision_](const RunContext& context) {
-      FinishRun(experiment, context, revision);
+      MakeRun(experiment, context, revision);
       return std::string("done");
     };
   });
@@ -521,31 +530,31 @@ std::string Bench::Propose(const RunContext& context) {
   {
     const Lock lock(mutex_);
     subject = subject_;
-    name = Now(history_).subject;
+    name = CurrentState(history_).subject;
     revision = revision_;
   }
-  std::vector<ReferenceHead> made_up;
+  std::vector<ReferenceHead> phantoms;
   if (references_.empty()) {
-    made_up.push_back(PhantomReference(1));
-    made_up.push_back(PhantomReference(2));
+    phantoms.push_back(PhantomReference(1));
+    phantoms.push_back(PhantomReference(2));
   }
   const Proposal proposal = ProposeLandmarks(subject->skull.mesh, "the skull",
-                                             references_.empty() ? made_up : references_, context);
+                                             references_.empty() ? phantoms : references_, context);
   LandmarkFile file = ProposalFile(proposal, name);
-  file.axes = "LPS";  // the points are where they were seen, on the mesh as it stands here
+  file.axes = "LPS";  // the points lie on the mesh as it is shown here
   const Lock lock(mutex_);
   if (revision != revision_) {
     throw Cancelled();
   }
-  Take(Done(history_, "proposed landmarks", TakeProposals(Now(history_), file)),
-       /*keeps_run=*/true);
-  std::string words = fmt::format("{} sites proposed, {} absent; look at each",
-                                  file.landmarks.size(), file.absent.size());
+  Commit(AddStep(history_, "proposed landmarks", AddProposals(CurrentState(history_), file)),
+         /*by_job=*/true);
+  std::string words = fmt::format("{} sites proposed, {} absent; check each", file.landmarks.size(),
+                                  file.absent.size());
   if (proposal.axes == "RAS") {
-    words += ". The skull lies as in RAS: if its file is, set its axes to RAS";
+    words += ". The skull seems to lie in RAS axes: if its file does, set its axes to RAS";
   }
   if (references_.empty()) {
-    words += ". Made-up heads served as references, which have no orbits, arches or teeth";
+    words += ". The references were phantoms, which have no orbits, arches or teeth";
   }
   return words;
 }
@@ -556,18 +565,18 @@ std::string Bench::Open(const OpenRequest& request, const RunContext& context) {
   int revision = 0;
   {
     const Lock lock(mutex_);
-    state = Now(history_);
+    state = CurrentState(history_);
     experiment = experiment_;
     revision = revision_;
   }
   std::string words;
-  OpenBrought(request, {folder_, state, experiment}, context, [&](Opened opened) {
+  OpenImportedFile(request, {folder_, state, experiment}, context, [&](Opened opened) {
     const Lock lock(mutex_);
     if (revision != revision_) {
       throw Cancelled();
     }
     words = fmt::format("{}", fmt::join(opened.notes, "; "));
-    Take(Done(history_, opened.what, std::move(opened.state)), /*keeps_run=*/true);
+    Commit(AddStep(history_, opened.what, std::move(opened.state)), /*by_job=*/true);
   });
   return words;
 }

@@ -22,7 +22,7 @@ auto Find(std::vector<BenchLandmark>& landmarks, const std::string& site) {
   return std::ranges::find(landmarks, site, &BenchLandmark::site);
 }
 
-BenchLandmark& Placed(BenchState& state, const std::string& site) {
+BenchLandmark& RequirePlaced(BenchState& state, const std::string& site) {
   const auto at = Find(state.landmarks, site);
   if (at == state.landmarks.end()) {
     throw InputError(fmt::format("landmarks: {} is not placed", SiteInWords(site)));
@@ -30,7 +30,7 @@ BenchLandmark& Placed(BenchState& state, const std::string& site) {
   return *at;
 }
 
-void ForgetAbsence(BenchState& state, const std::string& site) {
+void DropAbsence(BenchState& state, const std::string& site) {
   std::erase_if(state.absent, [&site](const BenchAbsent& absent) { return absent.site == site; });
 }
 
@@ -53,25 +53,6 @@ BenchLandmark ToBench(const Landmark& l, bool proposed) {
 
 }  // namespace
 
-LandmarkFile LandmarksOf(const BenchState& state) {
-  LandmarkFile file;
-  file.subject = state.subject.empty() ? "subject" : state.subject;
-  for (const BenchLandmark& l : state.landmarks) {
-    file.landmarks.push_back({.site = l.site,
-                              .point = l.point,
-                              .normal = l.normal,
-                              .depth_along_normal_mm = l.depth_along_normal_mm,
-                              .depth_closest_mm = l.depth_closest_mm,
-                              .certainty = l.certainty,
-                              .note = l.note});
-    file.proposed = file.proposed || l.proposed;
-  }
-  for (const BenchAbsent& absent : state.absent) {
-    file.absent.push_back({absent.site, absent.reason});
-  }
-  return file;
-}
-
 BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& point) {
   CheckSite(site);
   if (!point.allFinite()) {
@@ -83,32 +64,32 @@ BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& 
   landmark.point = {point.x(), point.y(), point.z()};
   landmark.normal.reset();
   landmark.proposed = false;
-  ForgetAbsence(state, site);
+  DropAbsence(state, site);
   return state;
 }
 
 BenchState RemoveLandmark(BenchState state, const std::string& site) {
-  const BenchLandmark& placed = Placed(state, site);
+  const BenchLandmark& placed = RequirePlaced(state, site);
   state.landmarks.erase(state.landmarks.begin() + (&placed - state.landmarks.data()));
   return state;
 }
 
 BenchState RenameLandmark(BenchState state, const std::string& site, const std::string& name) {
   CheckSite(name);
-  BenchLandmark& landmark = Placed(state, site);
+  BenchLandmark& landmark = RequirePlaced(state, site);
   if (const auto other = Find(state.landmarks, name); other != state.landmarks.end()) {
     other->site = site;
   }
   landmark.site = name;
-  ForgetAbsence(state, name);
+  DropAbsence(state, name);
   return state;
 }
 
-BenchState CallAbsent(BenchState state, const std::string& site, const std::string& reason) {
+BenchState MarkAbsent(BenchState state, const std::string& site, const std::string& reason) {
   CheckSite(site);
   std::erase_if(state.landmarks, [&site](const BenchLandmark& l) { return l.site == site; });
-  ForgetAbsence(state, site);
-  state.absent.push_back({site, reason.empty() ? "not said" : reason});
+  DropAbsence(state, site);
+  state.absent.push_back({site, reason.empty() ? "not stated" : reason});
   return state;
 }
 
@@ -116,13 +97,13 @@ BenchState RemarkLandmark(BenchState state, const std::string& site,
                           const LandmarkRemarks& remarks) {
   const auto& depth = remarks.depth_along_normal_mm;
   if (depth && !(*depth >= 0.01 && *depth <= 100)) {
-    throw InputError(fmt::format("landmarks: a depth of {} mm; give 0.01 to 100", *depth));
+    throw InputError(fmt::format("landmarks: the depth is {} mm; give 0.01 to 100", *depth));
   }
-  if (remarks.note.size() > kLongestNote) {
-    throw InputError(fmt::format("landmarks: a note of {} bytes; at most {} are kept",
-                                 remarks.note.size(), kLongestNote));
+  if (remarks.note.size() > kMaxNote_bytes) {
+    throw InputError(fmt::format("landmarks: the note has {} bytes; shorten it to {}",
+                                 remarks.note.size(), kMaxNote_bytes));
   }
-  BenchLandmark& landmark = Placed(state, site);
+  BenchLandmark& landmark = RequirePlaced(state, site);
   landmark.certainty = remarks.certainty;
   landmark.note = remarks.note;
   landmark.depth_along_normal_mm = depth;
@@ -130,7 +111,7 @@ BenchState RemarkLandmark(BenchState state, const std::string& site,
 }
 
 BenchState ConfirmLandmark(BenchState state, const std::string& site) {
-  Placed(state, site).proposed = false;
+  RequirePlaced(state, site).proposed = false;
   return state;
 }
 
@@ -141,7 +122,7 @@ BenchState ConfirmAllLandmarks(BenchState state) {
   return state;
 }
 
-BenchState TakeLandmarks(BenchState state, const LandmarkFile& file) {
+BenchState ReplaceLandmarks(BenchState state, const LandmarkFile& file) {
   state.landmarks.clear();
   state.absent.clear();
   for (const Landmark& landmark : file.landmarks) {
@@ -156,7 +137,7 @@ BenchState TakeLandmarks(BenchState state, const LandmarkFile& file) {
   return state;
 }
 
-BenchState TakeProposals(BenchState state, const LandmarkFile& file) {
+BenchState AddProposals(BenchState state, const LandmarkFile& file) {
   for (const Landmark& landmark : file.landmarks) {
     const auto at = Find(state.landmarks, landmark.site);
     const bool is_absent =
@@ -190,9 +171,9 @@ BenchState DropSetting(BenchState state, const std::string& path) {
   return state;
 }
 
-BenchState InOtherFrame(BenchState state, const std::vector<std::string>& sites,
-                        const FileSubject& before, const FileSubject& after) {
-  const auto turned = [&](const std::array<double, 3>& v) {
+BenchState ChangeFrame(BenchState state, const std::vector<std::string>& sites,
+                       const FileSubject& before, const FileSubject& after) {
+  const auto turn = [&](const std::array<double, 3>& v) {
     const Vec3 now = ToLps(ToLps({v[0], v[1], v[2]}, before.axes), after.axes);
     return std::array{now.x(), now.y(), now.z()};
   };
@@ -201,18 +182,18 @@ BenchState InOtherFrame(BenchState state, const std::vector<std::string>& sites,
     if (std::ranges::find(sites, landmark.site) == sites.end()) {
       continue;
     }
-    landmark.point = turned(landmark.point);
+    landmark.point = turn(landmark.point);
     for (double& x : landmark.point) {
       x *= scale;
     }
     if (landmark.normal) {
-      landmark.normal = turned(*landmark.normal);
+      landmark.normal = turn(*landmark.normal);
     }
   }
   return state;
 }
 
-BenchState TakeEdits(BenchState state, EditScript edits) {
+BenchState ReplaceEdits(BenchState state, EditScript edits) {
   state.edits = std::move(edits);
   return state;
 }

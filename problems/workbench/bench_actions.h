@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a person does at the workbench: each action makes a new state of an old one, and nothing
-// else. Throws InputError for what cannot be meant; the old state is a value and stays.
+// The actions of a person at the workbench. Each takes a state by value and returns the new state;
+// none has another effect. Each throws InputError for arguments that make no sense.
 #pragma once
 
 #include <cstddef>
@@ -14,49 +14,52 @@
 
 namespace semblance {
 
-// Places the site, or moves it there; it is then a person's, and no longer absent. What was
-// measured and noted there stays, the normal goes: it was that of the former place.
+// Places the site or moves it. The site is then neither proposed nor absent. Its measurements and
+// its note stay. Its normal is dropped because the normal belonged to the former place.
 BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& point);
 
 BenchState RemoveLandmark(BenchState state, const std::string& site);
 
-// The name `site` becomes `name`; a landmark that bears that name already takes the other one.
+// Renames the landmark at `site` to `name`. If `name` is placed already, the two exchange names.
 BenchState RenameLandmark(BenchState state, const std::string& site, const std::string& name);
 
-// The site cannot be placed; it is removed where it was.
-BenchState CallAbsent(BenchState state, const std::string& site, const std::string& reason);
+// Marks a site that cannot be placed. Its landmark is removed.
+BenchState MarkAbsent(BenchState state, const std::string& site, const std::string& reason);
 
-// What the observer knows beside the place. depth: measured along the normal; none: not measured.
-inline constexpr std::size_t kLongestNote = 4000;
+// An observer's remarks on a landmark.
+inline constexpr std::size_t kMaxNote_bytes = 4000;
 struct LandmarkRemarks {
   Certainty certainty = Certainty::kMedium;
-  std::string note = {};  // at most kLongestNote bytes
-  std::optional<double> depth_along_normal_mm = {};
+  std::string note = {};                             // at most kMaxNote_bytes
+  std::optional<double> depth_along_normal_mm = {};  // none: not measured
 };
 BenchState RemarkLandmark(BenchState state, const std::string& site,
                           const LandmarkRemarks& remarks);
 
-// A person has looked at it, or at all of them.
+// Record that a person has checked one proposed landmark, or all of them.
 BenchState ConfirmLandmark(BenchState state, const std::string& site);
 BenchState ConfirmAllLandmarks(BenchState state);
 
-// All landmarks of a file in place of those that are there. Points that the file calls proposed
-// are so.
-BenchState TakeLandmarks(BenchState state, const LandmarkFile& file);
+// Replaces all landmarks by those of a file. They count as proposed if the file is.
+BenchState ReplaceLandmarks(BenchState state, const LandmarkFile& file);
 
-// Proposed points for the sites that a person has neither placed nor called absent.
-BenchState TakeProposals(BenchState state, const LandmarkFile& file);
+// Adds proposed points for the sites that a person has neither placed nor marked absent. Earlier
+// proposals are replaced.
+BenchState AddProposals(BenchState state, const LandmarkFile& file);
 
-// A new type of a variant drops what was set of the old one. value: YAML on one line.
+// Sets an option. value: YAML on one line. A new `type` of a variant drops the settings of the
+// former type.
 BenchState ChangeSetting(BenchState state, const std::string& path, const std::string& value);
 
-// The option is again what it was in the file that the workbench began with, and all below it.
+// Drops the settings of the option and of all options below it. Their values are then those of the
+// file `state.start`.
 BenchState DropSetting(BenchState state, const std::string& path);
 
-// Landmarks of these sites go along with the subject's files, which are read in another frame now.
-BenchState InOtherFrame(BenchState state, const std::vector<std::string>& sites,
-                        const FileSubject& before, const FileSubject& after);
+// Moves the landmarks of these sites from the frame `before` to the frame `after` of the subject's
+// files, so that they stay on the bone when axes or unit are corrected.
+BenchState ChangeFrame(BenchState state, const std::vector<std::string>& sites,
+                       const FileSubject& before, const FileSubject& after);
 
-BenchState TakeEdits(BenchState state, EditScript edits);
+BenchState ReplaceEdits(BenchState state, EditScript edits);
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The files that the workbench carries; CMake puts their text into the program.
+// The files that the program carries for the workbench. CMake embeds their text.
 #pragma once
 
 #include <span>
@@ -13,6 +13,6 @@ struct BenchAsset {
 };
 
 std::span<const BenchAsset> PageFiles();     // of problems/page
-std::span<const BenchAsset> StarterFiles();  // tables of depths and the dowel network
+std::span<const BenchAsset> StarterFiles();  // depth tables and the depth marker network
 
 }  // namespace semblance

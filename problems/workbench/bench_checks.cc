@@ -17,20 +17,20 @@
 namespace semblance {
 namespace {
 
-Vec3 PointOf(const Landmark& l) { return {l.point[0], l.point[1], l.point[2]}; }
+Vec3 ToVec3(const Landmark& l) { return {l.point[0], l.point[1], l.point[2]}; }
 
-std::vector<SitePoint> StandardOnes(const LandmarkFile& file) {
+std::vector<SitePoint> StandardSites(const LandmarkFile& file) {
   std::vector<SitePoint> sites;
   for (const Landmark& l : file.landmarks) {
     if (IsStandardSite(l.site)) {
-      sites.push_back({l.site, PointOf(l)});
+      sites.push_back({l.site, ToVec3(l)});
     }
   }
   return sites;
 }
 
-// None where there are too few sites, or all lie on a line.
-std::optional<SkullFit> FitOf(std::span<const SitePoint> sites) {
+// Return none if there are too few sites or all lie on a line.
+std::optional<SkullFit> TryFitAverageSkull(std::span<const SitePoint> sites) {
   try {
     return FitAverageSkull(sites);
   } catch (const InputError&) {
@@ -38,7 +38,7 @@ std::optional<SkullFit> FitOf(std::span<const SitePoint> sites) {
   }
 }
 
-std::optional<MidPlane> PlaneOf(std::span<const SitePoint> sites) {
+std::optional<MidPlane> TryFitMidPlane(std::span<const SitePoint> sites) {
   try {
     return FitMidPlane(sites);
   } catch (const InputError&) {
@@ -59,6 +59,7 @@ void MeasureMirrors(std::span<const SitePoint> sites, const MidPlane& plane,
 
 void Predict(const SkullFit& fit, std::span<const SitePoint> sites, const MeshQuery& bone,
              LandmarkChecks& checks) {
+  // Farther predictions lie beside missing or broken bone.
   constexpr double kFarthest_mm = 15;
   for (std::size_t k = 0; k < sites.size(); ++k) {
     checks.sites[sites[k].site].from_predicted_mm = fit.residual_mm[k];
@@ -80,13 +81,13 @@ LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, co
                               const PlaceOptions& options) {
   LandmarkChecks checks;
   for (const Landmark& l : file.landmarks) {
-    checks.sites[l.site].from_bone_mm = bone.Closest(PointOf(l)).distance_mm;
+    checks.sites[l.site].from_bone_mm = bone.Closest(ToVec3(l)).distance_mm;
   }
-  const std::vector<SitePoint> sites = StandardOnes(file);
-  if (const auto fit = FitOf(sites)) {
+  const std::vector<SitePoint> sites = StandardSites(file);
+  if (const auto fit = TryFitAverageSkull(sites)) {
     Predict(*fit, sites, bone, checks);
   }
-  if (const auto plane = PlaneOf(sites)) {
+  if (const auto plane = TryFitMidPlane(sites)) {
     MeasureMirrors(sites, *plane, checks);
   }
   if (!file.landmarks.empty()) {

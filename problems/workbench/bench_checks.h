@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What can be said of landmarks while they are placed.
+// Checks of the landmarks, made after each action while a person places them.
 #pragma once
 
 #include <map>
@@ -11,25 +11,25 @@
 
 namespace semblance {
 
-// Of one landmark, mm; NaN where it cannot be said.
+// Distances of one landmark in mm; NaN if a distance cannot be computed.
 struct SiteCheck {
-  double from_bone_mm = kNaN;       // how far the point is from the bone
-  double from_predicted_mm = kNaN;  // from where the others and an average skull predict it
-  double from_mirror_mm = kNaN;     // from the mirror image of its partner, or from the mid-plane
+  double from_bone_mm = kNaN;       // to the closest point of the bone
+  double from_predicted_mm = kNaN;  // to the prediction from the others and an average skull
+  double from_mirror_mm = kNaN;     // to the mirror image of its partner, or to the mid-plane
 };
 
 struct LandmarkChecks {
-  std::map<std::string, SiteCheck> sites;  // of those that are placed
-  std::map<std::string, Vec3> predicted;   // of the standard sites that are not placed, on the bone
-  std::vector<std::string> errors, notes;  // as FindLandmarkMistakes
+  std::map<std::string, SiteCheck> sites;  // the placed sites
+  std::map<std::string, Vec3> predicted;   // standard sites that are not placed, on the bone
+  std::vector<std::string> errors, notes;  // from FindLandmarkMistakes
 };
 
-// From three sites on the others are predicted, and from one pair and a third site the mid-plane is
-// known. predicted points further than 15 mm from any bone are left out.
+// Three sites or more predict the others. One pair and a third site define the mid-plane. A
+// prediction more than 15 mm from any bone is left out.
 LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, const MeshQuery& bone,
                               const PlaceOptions& options);
 
-// The predicted points as landmarks that a person has to look at.
+// The predicted points as proposed landmarks, which a person has to check.
 LandmarkFile PredictedLandmarks(const LandmarkChecks& checks);
 
 }  // namespace semblance

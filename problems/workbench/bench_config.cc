@@ -12,8 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// What the state says beside its settings.
-std::vector<BenchSetting> SettingsOf(const BenchState& state) {
+// The state's settings, and those that name its landmark file and its edit script.
+std::vector<BenchSetting> AllSettings(const BenchState& state) {
   std::vector<BenchSetting> settings = state.settings;
   if (!state.landmarks.empty()) {
     settings.push_back({"subject.landmarks", "landmarks.yaml"});
@@ -30,7 +30,7 @@ bool SameText(const ConfigNode* a, const ConfigNode* b) {
 
 bool Same(const ConfigNode& a, const ConfigNode& b) { return ToFlowYaml(a) == ToFlowYaml(b); }
 
-// What `tree` says that `defaults` does not.
+// The entries of `tree` that differ from `defaults`. A variant of another type is kept whole.
 ConfigNode Difference(const ConfigNode& tree, const ConfigNode& defaults) {
   const ConfigNode *type = tree.Find("type"), *default_type = defaults.Find("type");
   const bool merges =
@@ -49,28 +49,28 @@ ConfigNode Difference(const ConfigNode& tree, const ConfigNode& defaults) {
   return difference;
 }
 
-// Paths are written absolute; in the folder they need not be.
-void CutFront(ConfigNode& node, const std::string& folder) {
+// Removes the folder from the front of every text, which makes absolute paths relative.
+void RemovePrefix(ConfigNode& node, const std::string& folder) {
   if (node.IsScalar() && node.text.starts_with(folder)) {
     node.text = node.text.substr(folder.size());
   }
   for (ConfigNode& item : node.items) {
-    CutFront(item, folder);
+    RemovePrefix(item, folder);
   }
   for (ConfigNode::Entry& entry : node.entries) {
-    CutFront(entry.value, folder);
+    RemovePrefix(entry.value, folder);
   }
 }
 
 }  // namespace
 
-Experiment ExperimentOf(std::string_view start, const fs::path& folder, const BenchState& state) {
+Experiment MakeExperiment(std::string_view start, const fs::path& folder, const BenchState& state) {
   ConfigErrors errors;
   ConfigNode tree =
       ParseConfigText(start, {.name = (folder / state.start).string(), .folder = folder}, errors);
   const ConfigNode defaults = ConfigTreeOf(Experiment{});
   int order = 1;
-  for (const BenchSetting& setting : SettingsOf(state)) {
+  for (const BenchSetting& setting : AllSettings(state)) {
     const ConfigNode value = ParseConfigText(
         setting.value,
         {.name = setting.path, .folder = folder, .order = order++, .has_lines = false}, errors);
@@ -82,7 +82,7 @@ Experiment ExperimentOf(std::string_view start, const fs::path& folder, const Be
 }
 
 void MakeRelative(ConfigNode& tree, const fs::path& folder) {
-  CutFront(tree, (fs::absolute(folder).lexically_normal() / "").string());
+  RemovePrefix(tree, (fs::absolute(folder).lexically_normal() / "").string());
 }
 
 std::string StartConfig(const Experiment& experiment, const fs::path& folder) {
@@ -94,8 +94,8 @@ std::string StartConfig(const Experiment& experiment, const fs::path& folder) {
 std::string ShortConfig(const Experiment& experiment, const fs::path& folder) {
   ConfigNode tree = Difference(ConfigTreeOf(experiment), ConfigTreeOf(Experiment{}));
   MakeRelative(tree, folder);
-  return "# Made by `semblance workbench`; "
-         "`semblance run` takes it. What it does not say is the default.\n" +
+  return "# Made by `semblance workbench`, for `semblance run`. Missing options have their "
+         "defaults.\n" +
          ToYaml(tree);
 }
 

@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <array>
+#include <memory>
 #include <string_view>
 #include <system_error>
 
 #include "problems/config/config_tree.h"
+#include "problems/config/utf8_check.h"
 #include "problems/landmark_files/read_landmarks.h"
 #include "problems/pipeline/experiment_config.h"
 #include "problems/workbench/bench_assets.h"
@@ -25,7 +27,7 @@ constexpr const char* kHistory = "workbench.yaml";
 constexpr const char* kStart = "start.yaml";
 constexpr const char* kClaim = ".semblance-workbench";
 
-fs::path Made(const fs::path& root) {
+fs::path MakeFolder(const fs::path& root) {
   std::error_code error;
   fs::create_directories(root, error);
   if (error) {
@@ -35,7 +37,7 @@ fs::path Made(const fs::path& root) {
   return fs::canonical(root);
 }
 
-// Replaced where it differs, removed where there is nothing to say.
+// Writes the text if the file differs from it. Removes the file if the text is empty.
 void WriteOrRemove(const fs::path& path, const std::string& text) {
   if (text.empty()) {
     fs::remove(path);
@@ -44,10 +46,31 @@ void WriteOrRemove(const fs::path& path, const std::string& text) {
   }
 }
 
+constexpr const char* kIncoming = "incoming";
+constexpr std::size_t kMaxName_bytes = 200;  // most file systems allow 255
+
+bool IsSafeName(const std::string& name) {
+  ConfigErrors errors;
+  const auto nowhere = std::make_shared<const ConfigSource>();
+  return !name.empty() && name.size() <= kMaxName_bytes && name[0] != '.' &&
+         name.find_first_of("/\\\n\r\t") == std::string::npos &&
+         RequireReadableBytes(name, nowhere, errors);
+}
+
+std::string RequireSafeName(const std::string& name) {
+  if (!IsSafeName(name)) {
+    throw InputError(
+        fmt::format("upload: a file's name has 1 to {} bytes, no control characters, no slashes "
+                    "and no dot in front; rename the file",
+                    kMaxName_bytes));
+  }
+  return name;
+}
+
 }  // namespace
 
 std::string LandmarksText(const BenchState& state) {
-  return state.landmarks.empty() ? "" : EncodeLandmarks(LandmarksOf(state), "landmarks.yaml");
+  return state.landmarks.empty() ? "" : EncodeLandmarks(ToLandmarkFile(state), "landmarks.yaml");
 }
 
 std::string EditsText(const BenchState& state) {
@@ -63,22 +86,22 @@ fs::path FreePath(const fs::path& wanted) {
   return path;
 }
 
-BenchFolder::BenchFolder(const fs::path& root) : root_(Made(root)) {
+BenchFolder::BenchFolder(const fs::path& root) : root_(MakeFolder(root)) {
   claim_.Take(root_ / kClaim, root_.string());
 }
 
 bool BenchFolder::HasWork() const { return fs::exists(root_ / kHistory); }
 
 void BenchFolder::CheckFree() const {
-  // What a beginning that was cut short may have left.
+  // A workbench that ended during its start may have left these.
   constexpr std::array<std::string_view, 6> kOwn = {kClaim,   kStart,     "subject",
                                                     "tables", "networks", "incoming"};
   for (const auto& entry : fs::directory_iterator(root_)) {
     const std::string name = entry.path().filename().string();
     if (std::ranges::find(kOwn, name) == kOwn.end()) {
-      throw IoError(fmt::format(
-          "{}: the folder holds other things ({}); give one that is empty or not there yet",
-          root_.string(), name));
+      throw IoError(
+          fmt::format("{}: the folder holds other files ({}); give an empty or a new folder",
+                      root_.string(), name));
     }
   }
 }
@@ -92,7 +115,7 @@ void BenchFolder::Begin(const std::string& start, const BenchState& state) {
     }
   }
   WriteFileAtomically(root_ / kStart, start);
-  Write(BeginHistory(state), ExperimentOf(state));
+  Write(BeginHistory(state), ReadExperiment(state));
 }
 
 std::string BenchFolder::AddStart(const std::string& text) const {
@@ -107,13 +130,13 @@ BenchHistory BenchFolder::Read() const {
 }
 
 void BenchFolder::Write(const BenchHistory& history, const Experiment& experiment) const {
-  const BenchState& state = Now(history);
+  const BenchState& state = CurrentState(history);
   const std::string text = HistoryText(history);
   if (text.size() > kLargestConfig_bytes) {
-    throw InputError(
-        fmt::format("{}: the work and its last {} steps would take {} MB, more than could be read "
-                    "again; shorten the notes",
-                    kHistory, history.steps.size(), text.size() / 1'000'000));
+    throw InputError(fmt::format(
+        "{}: the state and its last {} steps would take {} MB, too much to be read back; "
+        "shorten the notes",
+        kHistory, history.steps.size(), text.size() / 1'000'000));
   }
   WriteFileAtomically(root_ / kHistory, text);
   WriteOrRemove(root_ / "landmarks.yaml", LandmarksText(state));
@@ -121,16 +144,46 @@ void BenchFolder::Write(const BenchHistory& history, const Experiment& experimen
   WriteOrRemove(root_ / "config.yaml", ShortConfig(experiment, root_));
 }
 
-Experiment BenchFolder::ExperimentOf(const BenchState& state) const {
+Experiment BenchFolder::ReadExperiment(const BenchState& state) const {
   if (state.start != fs::path(state.start).filename()) {
     throw IoError(fmt::format("{}: start: '{}' is not a file of the folder",
                               (root_ / kHistory).string(), state.start));
   }
-  return semblance::ExperimentOf(ReadFileBytes(root_ / state.start), root_, state);
+  return MakeExperiment(ReadFileBytes(root_ / state.start), root_, state);
 }
 
-Experiment BenchFolder::ExperimentAsSaved() const {
+Experiment BenchFolder::ReadSavedExperiment() const {
   return ReadConfig<Experiment>(root_ / "config.yaml");
 }
+
+fs::path IncomingBatch(const fs::path& root, const std::string& batch) {
+  return root / kIncoming / RequireSafeName(batch);
+}
+
+fs::path SaveIncoming(const fs::path& root, const std::string& batch, const std::string& name,
+                      std::string_view bytes) {
+  fs::path path = IncomingBatch(root, batch);
+  for (std::size_t from = 0; from <= name.size();) {
+    const std::size_t slash = std::min(name.find('/', from), name.size());
+    path /= RequireSafeName(name.substr(from, slash - from));
+    from = slash + 1;
+  }
+  fs::create_directories(path.parent_path());
+  WriteFileAtomically(path, bytes);
+  return path;
+}
+
+fs::path FindBatch(const fs::path& root, const fs::path& path) {
+  const fs::path inside =
+      fs::absolute(path).lexically_normal().lexically_relative(root / kIncoming);
+  const std::string batch = inside.empty() ? "" : inside.begin()->string();
+  return IsSafeName(batch) ? root / kIncoming / batch : fs::path();
+}
+
+void DropIncoming(const fs::path& root, const std::string& batch) {
+  fs::remove_all(IncomingBatch(root, batch));
+}
+
+void DropAllIncoming(const fs::path& root) { fs::remove_all(root / kIncoming); }
 
 }  // namespace semblance

@@ -19,7 +19,7 @@ void BenchJob::Start(const std::string& name, int threads,
   Stop();
   {
     const std::lock_guard lock(mutex_);
-    status_ = {.name = name, .state = JobState::kRunning, .step = "begins"};
+    status_ = {.name = name, .state = JobState::kRunning, .step = "starting"};
     began_ = std::chrono::steady_clock::now();
   }
   thread_ = std::jthread([this, threads, work = std::move(work)](const std::stop_token& stop) {
@@ -46,7 +46,7 @@ void BenchJob::Run(const std::function<std::string(const RunContext&)>& work,
     words = "stopped";
   } catch (const std::bad_alloc&) {
     state = JobState::kFailed;
-    words = "not enough memory; lower implicit.resolution, or give smaller meshes";
+    words = "not enough memory; lower implicit.resolution, or use smaller meshes";
   } catch (const std::exception& error) {
     state = JobState::kFailed;
     words = error.what();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One long piece of work in the background at a time.
+// Runs one long job at a time in a background thread.
 #pragma once
 
 #include <chrono>
@@ -16,27 +16,27 @@ namespace semblance {
 enum class JobState { kIdle, kRunning, kFinished, kFailed, kStopped };
 
 struct JobStatus {
-  std::string name;  // "run", "propose"
+  std::string name;  // "run", "propose", "open", "variants"
   JobState state = JobState::kIdle;
-  std::string step;        // of the work, as RunContext reports it
+  std::string step;        // of the work, from RunContext
   double fraction = kNaN;  // of the step
-  double seconds = kNaN;   // since it began; of a finished one, in all
-  std::string words = {};  // why it failed, or what came of it
+  double seconds = kNaN;   // since the start, or the whole duration of an ended job
+  std::string words = {};  // summary of the result, or reason of the failure
 };
 
 class BenchJob {
  public:
   ~BenchJob() { Stop(); }
 
-  // Starts the work in a thread of its own; a piece that still runs is stopped first. work returns
-  // what came of it, for people. What it throws becomes the status.
+  // Starts the work in its own thread, after stopping a job that still runs. work returns a summary
+  // for people. An exception of work becomes the status.
   void Start(const std::string& name, int threads,
              std::function<std::string(const RunContext&)> work);
 
-  // Asks the work to stop, and returns at once.
+  // Requests a stop and returns at once.
   void Cancel();
 
-  // Waits until nothing runs.
+  // Requests a stop and waits until the job has ended.
   void Stop();
 
   JobStatus Status() const;

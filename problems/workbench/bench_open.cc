@@ -19,7 +19,6 @@
 #include "problems/volumes/read_volume.h"
 #include "problems/workbench/bench_actions.h"
 #include "problems/workbench/bench_config.h"
-#include "problems/workbench/bench_incoming.h"
 #include "problems/workbench/bench_subject.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -32,18 +31,12 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kKinds =
-    "what can be opened: a mesh (.ply, .obj, .stl, .off), a CT or MR (a folder of DICOM slices, "
+    "these can be opened: a mesh (.ply, .obj, .stl, .off), a CT or MR (a folder of DICOM slices, "
     ".nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd, .inv3), landmarks (.yaml, .mrk.json, .fcsv, .pp, "
     ".csv, .txt), a configuration (.yaml)";
 
-template <class Enum>
-std::string_view WordOf(Enum value) {
-  constexpr auto kNames = EnumNames(Enum{});
-  return kNames.at(static_cast<std::size_t>(value));
-}
-
 // ---------------------------------------------------------------------------------------------
-// What a file is
+// The kind of a file
 // ---------------------------------------------------------------------------------------------
 
 std::string LowerName(const fs::path& path) { return LowerCase(path.filename().string()); }
@@ -61,43 +54,43 @@ constexpr std::array<std::string_view, 2> kYaml = {".yaml", ".yml"};
 constexpr std::array<std::string_view, 8> kPacked = {".zip", ".gz",  ".tar", ".tgz",
                                                      ".7z",  ".rar", ".bz2", ".xz"};
 
-std::optional<BroughtKind> KindByName(const std::string& name) {
-  return EndsWithOneOf(name, kMeshes)          ? std::optional(BroughtKind::kMesh)
-         : EndsWithOneOf(name, kVolumes)       ? std::optional(BroughtKind::kVolume)
-         : EndsWithOneOf(name, kLandmarkFiles) ? std::optional(BroughtKind::kLandmarks)
+std::optional<ImportKind> KindByName(const std::string& name) {
+  return EndsWithOneOf(name, kMeshes)          ? std::optional(ImportKind::kMesh)
+         : EndsWithOneOf(name, kVolumes)       ? std::optional(ImportKind::kVolume)
+         : EndsWithOneOf(name, kLandmarkFiles) ? std::optional(ImportKind::kLandmarks)
                                                : std::nullopt;
 }
 
-// By its keys; a file of another kind is refused with what to do with it.
-BroughtKind KindOfYaml(const fs::path& path) {
+// Finds the kind by the keys. The messages for other YAML files state their use.
+ImportKind YamlKind(const fs::path& path) {
   ConfigErrors errors;
   const ConfigNode tree = ParseConfigText(
       ReadFileBytes(path), {.name = path.string(), .folder = path.parent_path()}, errors);
   errors.ThrowIfAny();
   const ConfigNode* landmarks = tree.Find("landmarks");
   if (landmarks != nullptr && landmarks->IsList()) {
-    return BroughtKind::kLandmarks;
+    return ImportKind::kLandmarks;
   }
   for (const char* key : {"grid", "zip", "list", "sample", "search", "subjects"}) {
     if (tree.Find(key) != nullptr) {
-      throw InputError(
-          fmt::format("{}: a study, and the workbench holds one head: run it with `semblance "
-                      "study`, and open the `base` of it here",
-                      path.string()));
+      throw InputError(fmt::format(
+          "{}: this is a study, and the workbench holds one head; run it with `semblance "
+          "study`, and open its `base` here",
+          path.string()));
     }
   }
   if (tree.Find("rows") != nullptr) {
     throw InputError(
-        fmt::format("{}: a table of depths: open a head first, then give the table's path as "
+        fmt::format("{}: this is a depth table; open a head first, then give the table's path as "
                     "tissue.table (tab Face, All options)",
                     path.string()));
   }
   if (tree.Find("base") == nullptr && OwnKeys<Experiment>(path) == 0) {
-    throw InputError(
-        fmt::format("{}: no key at its top is an experiment's or a landmark file's; {}",
-                    path.string(), kKinds));
+    throw InputError(fmt::format(
+        "{}: none of its top-level keys belongs to an experiment or a landmark file; {}",
+        path.string(), kKinds));
   }
-  return BroughtKind::kConfig;
+  return ImportKind::kConfig;
 }
 
 bool IsDicom(const fs::path& path) {
@@ -107,45 +100,44 @@ bool IsDicom(const fs::path& path) {
   return file && std::string_view(&bytes[128], 4) == "DICM";
 }
 
-Brought LookAtFile(const fs::path& path) {
+ImportedFile IdentifyFile(const fs::path& path) {
   const std::string name = LowerName(path);
   if (const auto kind = KindByName(name)) {
     return {*kind, path};
   }
   if (EndsWithOneOf(name, kYaml)) {
-    return {KindOfYaml(path), path};
+    return {YamlKind(path), path};
   }
   if (EndsWithOneOf(name, kPacked)) {
     throw InputError(
-        fmt::format("{}: an archive; unpack it, and open what is in it", path.string()));
+        fmt::format("{}: this is an archive; unpack it, and open its files", path.string()));
   }
   if (IsDicom(path)) {
     throw InputError(
-        fmt::format("{}: one slice of a volume; bring all slices of the series together, or the "
-                    "folder that holds them",
+        fmt::format("{}: this is one slice of a volume; open all slices of the series together, or "
+                    "their folder",
                     path.string()));
   }
-  throw InputError(
-      fmt::format("{}: not a kind of file that is known here; {}", path.string(), kKinds));
+  throw InputError(fmt::format("{}: this kind of file is unknown; {}", path.string(), kKinds));
 }
 
 // ---------------------------------------------------------------------------------------------
-// What a folder is
+// The kind of a folder
 // ---------------------------------------------------------------------------------------------
 
-// The files in a folder that can be opened by themselves.
-std::map<BroughtKind, std::vector<fs::path>> OpenableFiles(const fs::path& folder) {
-  std::map<BroughtKind, std::vector<fs::path>> files;
+// The files in a folder that can be opened without the other files.
+std::map<ImportKind, std::vector<fs::path>> OpenableFiles(const fs::path& folder) {
+  std::map<ImportKind, std::vector<fs::path>> files;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
     const std::string name = LowerName(entry.path());
     if (!entry.is_regular_file() || name.starts_with('.')) {
       continue;
     }
-    std::optional<BroughtKind> kind = KindByName(name);
+    std::optional<ImportKind> kind = KindByName(name);
     if (EndsWithOneOf(name, kYaml)) {
       try {
-        kind = KindOfYaml(entry.path());
-      } catch (const Error&) {  // a table, say, that a configuration names
+        kind = YamlKind(entry.path());
+      } catch (const Error&) {  // for example a table that a configuration names
       }
     }
     if (kind) {
@@ -158,22 +150,22 @@ std::map<BroughtKind, std::vector<fs::path>> OpenableFiles(const fs::path& folde
   return files;
 }
 
-std::string NamesOf(const std::vector<fs::path>& paths) {
-  constexpr std::size_t kMost = 6;
+std::string ListNames(const std::vector<fs::path>& paths) {
+  constexpr std::size_t kMaxNames = 6;
   std::vector<std::string> names;
   for (const fs::path& path : paths) {
     names.push_back(path.filename().string());
   }
-  const std::size_t more = names.size() - std::min(names.size(), kMost);
+  const std::size_t more = names.size() - std::min(names.size(), kMaxNames);
   names.resize(names.size() - more);
   return fmt::format("{}{}", fmt::join(names, ", "),
                      more > 0 ? fmt::format(" and {} more", more) : "");
 }
 
-// A folder that holds nothing but another one stands for it.
+// Descends while the folder holds nothing but one other folder.
 fs::path Innermost(fs::path folder) {
-  constexpr int kDeepest = 8;
-  for (int depth = 0; depth < kDeepest; ++depth) {
+  constexpr int kMaxDepth = 8;
+  for (int depth = 0; depth < kMaxDepth; ++depth) {
     const std::vector<fs::directory_entry> entries{fs::directory_iterator(folder), {}};
     if (entries.size() != 1 || !entries[0].is_directory()) {
       break;
@@ -183,26 +175,26 @@ fs::path Innermost(fs::path folder) {
   return folder;
 }
 
-// The only file of a folder; empty where there are more, or none.
+// The only entry of a folder if it is a file; otherwise empty.
 fs::path OnlyFile(const fs::path& folder) {
   const std::vector<fs::directory_entry> entries{fs::directory_iterator(folder), {}};
   return entries.size() == 1 && entries[0].is_regular_file() ? entries[0].path() : fs::path();
 }
 
-Brought LookAtFolder(const fs::path& given) {
+ImportedFile IdentifyFolder(const fs::path& given) {
   const fs::path folder = Innermost(given);
   if (const fs::path only = OnlyFile(folder); !only.empty()) {
-    return LookAtFile(only);
+    return IdentifyFile(only);
   }
   if (fs::exists(folder / "workbench.yaml")) {
     throw InputError(
-        fmt::format("{}: the folder of a workbench; open it from the terminal: semblance "
+        fmt::format("{}: this is the folder of a workbench; open it from the terminal: semblance "
                     "workbench {}",
                     folder.string(), folder.string()));
   }
   auto files = OpenableFiles(folder);
-  // A configuration names the others; a volume may have its voxels in a file of their own.
-  for (const BroughtKind kind : {BroughtKind::kConfig, BroughtKind::kVolume}) {
+  // A configuration names the other files. A volume may have its voxels in a separate file.
+  for (const ImportKind kind : {ImportKind::kConfig, ImportKind::kVolume}) {
     if (files[kind].size() == 1) {
       return {kind, files[kind].front()};
     }
@@ -212,19 +204,20 @@ Brought LookAtFolder(const fs::path& given) {
     all.insert(all.end(), paths.begin(), paths.end());
   }
   if (all.size() > 1) {
-    throw InputError(
-        fmt::format("{} files that are opened one by one: {}; bring one of them, or a "
-                    "configuration with the files that it names, or all slices of a volume",
-                    all.size(), NamesOf(all)));
+    throw InputError(fmt::format(
+        "{} files that cannot be opened together: {}; open one of them, or a configuration "
+        "with the files that it names, or all slices of a volume",
+        all.size(), ListNames(all)));
   }
-  return all.empty() ? Brought{BroughtKind::kVolume, folder} : LookAtFile(all.front());
+  return all.empty() ? ImportedFile{ImportKind::kVolume, folder} : IdentifyFile(all.front());
 }
 
 // ---------------------------------------------------------------------------------------------
 // Files that go into the folder
 // ---------------------------------------------------------------------------------------------
 
-// What an opening adds to the folder; gone again, and moved back, unless it is kept.
+// The files that an opening adds to the folder. Unless Keep() is called, the destructor removes the
+// added files and moves the moved files back.
 class Additions {
  public:
   explicit Additions(const BenchFolder& folder) : root_(folder.Root()) {}
@@ -242,7 +235,7 @@ class Additions {
 
   void Keep() { kept_ = true; }
 
-  // A path below subject/ that is free.
+  // Returns a free path below subject/.
   fs::path NewPath(const std::string& name) {
     fs::create_directories(root_ / "subject");
     added_.push_back(FreePath(root_ / "subject" / name));
@@ -251,14 +244,15 @@ class Additions {
 
   void Add(const fs::path& path) { added_.push_back(path); }
 
-  // Where a file stays: one of the browser's moves into subject/, alone or with all that came
-  // along; another one stays where it is.
-  fs::path Settled(const fs::path& path) {
-    return !BatchOf(root_, path).empty() ? Move(path, FreePath(root_ / "subject" / path.filename()))
-                                         : fs::absolute(path).lexically_normal();
+  // Return the permanent path of a file. An upload of the browser moves into subject/, alone or
+  // with its whole batch. Any other file stays at its place.
+  fs::path KeepFile(const fs::path& path) {
+    return !FindBatch(root_, path).empty()
+               ? Move(path, FreePath(root_ / "subject" / path.filename()))
+               : fs::absolute(path).lexically_normal();
   }
-  fs::path SettledWithAll(const fs::path& path) {
-    const fs::path batch = BatchOf(root_, path);
+  fs::path KeepFileWithBatch(const fs::path& path) {
+    const fs::path batch = FindBatch(root_, path);
     return batch.empty() ? fs::absolute(path).lexically_normal()
                          : Move(batch, FreePath(root_ / "subject" / path.stem())) /
                                fs::absolute(path).lexically_normal().lexically_relative(batch);
@@ -282,14 +276,14 @@ class Additions {
 // States
 // ---------------------------------------------------------------------------------------------
 
-// Within the folder relative to it, so that the folder can be moved.
+// A path inside the folder is relative to it, so that the folder can be moved.
 std::string PathForState(const fs::path& path, const fs::path& root) {
   const fs::path inside = path.lexically_relative(root);
   const bool is_inside = !inside.empty() && inside.begin()->string() != "..";
   return ToFlowYaml(ConfigNode::Quoted((is_inside ? inside : path).string()));
 }
 
-// The options stay, but for what is of the former head alone.
+// Replaces the head. The options stay, except the depths set for the former head.
 BenchState WithHead(BenchState state, const FileSubject& files, const std::string& name,
                     const fs::path& root) {
   Experiment experiment;
@@ -305,32 +299,33 @@ BenchState WithHead(BenchState state, const FileSubject& files, const std::strin
   return state;
 }
 
-// In the frame of the subject's files.
-TriMesh InFrameOf(const FileSubject& files, TriMesh mesh) {
+// Converts a mesh in mm and LPS to the axes and the unit of the subject's files.
+TriMesh ToSubjectFrame(const FileSubject& files, TriMesh mesh) {
   for (Vec3& p : mesh.points) {
     p = ToLps(p, files.axes) / Millimetres(files.units);
   }
   return mesh;
 }
 
-const FileSubject& FilesOf(const OpenBase& base) {
+const FileSubject& SubjectFiles(const OpenBase& base) {
   return std::get<FileSubject>(base.experiment.subject);
 }
 
-// Slices that were sent by themselves have no name together.
-std::string NameOfVolume(const fs::path& path, const fs::path& root) {
-  return BatchOf(root, path) == path ? "volume" : PlainName(path);
+// Slices uploaded without a folder have no common name.
+std::string VolumeName(const fs::path& path, const fs::path& root) {
+  return FindBatch(root, path) == path ? "volume" : PlainName(path);
 }
 
-Opened OpenSkinOf(const OpenRequest& request, const fs::path& path, const OpenBase& base,
-                  Additions& added, const RunContext& context) {
+Opened OpenSkinFromVolume(const OpenRequest& request, const fs::path& path, const OpenBase& base,
+                          Additions& added, const RunContext& context) {
   const VolumeReading reading = ReadVolume(path, request.volume.read, context);
   Opened opened{.what = {}, .state = base.state, .notes = reading.notes};
   TriMesh skin = reading.modality == Modality::kMr
                      ? ImportMrSkin(reading.volume, {}, context).skin
                      : ImportCt(reading.volume, request.volume.import, context).skin;
-  const fs::path file = added.NewPath(NameOfVolume(path, base.folder.Root()) + "_skin.ply");
-  WriteFileAtomically(file, EncodeMesh(InFrameOf(FilesOf(base), std::move(skin)), ".ply"));
+  const fs::path file = added.NewPath(VolumeName(path, base.folder.Root()) + "_skin.ply");
+  WriteFileAtomically(file,
+                      EncodeMesh(ToSubjectFrame(SubjectFiles(base), std::move(skin)), ".ply"));
   opened.state = ChangeSetting(std::move(opened.state), "subject.skin",
                                PathForState(file, base.folder.Root()));
   return opened;
@@ -338,7 +333,7 @@ Opened OpenSkinOf(const OpenRequest& request, const fs::path& path, const OpenBa
 
 Opened OpenMesh(const OpenRequest& request, const fs::path& path, const OpenBase& base,
                 Additions& added) {
-  const fs::path file = added.Settled(path);
+  const fs::path file = added.KeepFile(path);
   if (request.as == OpenAs::kHead) {
     FileSubject files;
     files.skull = file;
@@ -347,7 +342,7 @@ Opened OpenMesh(const OpenRequest& request, const fs::path& path, const OpenBase
             .notes = {}};
   }
   return {.what = {},
-          .state = ChangeSetting(base.state, fmt::format("subject.{}", WordOf(request.as)),
+          .state = ChangeSetting(base.state, fmt::format("subject.{}", EnumWord(request.as)),
                                  PathForState(file, base.folder.Root())),
           .notes = {}};
 }
@@ -355,9 +350,9 @@ Opened OpenMesh(const OpenRequest& request, const fs::path& path, const OpenBase
 Opened OpenVolume(const OpenRequest& request, const fs::path& path, const OpenBase& base,
                   Additions& added, const RunContext& context) {
   if (request.as == OpenAs::kSkin) {
-    return OpenSkinOf(request, path, base, added, context);
+    return OpenSkinFromVolume(request, path, base, added, context);
   }
-  const std::string name = NameOfVolume(path, base.folder.Root());
+  const std::string name = VolumeName(path, base.folder.Root());
   CtSubject subject = request.volume;
   subject.volume = path;
   subject.landmarks.clear();
@@ -371,7 +366,7 @@ Opened OpenVolume(const OpenRequest& request, const fs::path& path, const OpenBa
 
 Opened OpenConfig(const OpenRequest& request, const fs::path& path, const OpenBase& base,
                   Additions& added, const RunContext& context) {
-  const fs::path file = added.SettledWithAll(path);
+  const fs::path file = added.KeepFileWithBatch(path);
   Opened opened{.what = {}, .state = base.state, .notes = {}};
   Experiment experiment;
   if (request.as == OpenAs::kOptions) {
@@ -393,80 +388,80 @@ Opened OpenConfig(const OpenRequest& request, const fs::path& path, const OpenBa
 Opened OpenLandmarks(const OpenRequest& request, const fs::path& path, const OpenBase& base) {
   LandmarkReading reading = ReadLandmarks(path, {.axes = request.axes});
   return {.what = {},
-          .state = TakeLandmarks(base.state, reading.file),
+          .state = ReplaceLandmarks(base.state, reading.file),
           .notes = std::move(reading.notes)};
 }
 
-Opened OpenAsAsked(const OpenRequest& request, const Brought& brought, const OpenBase& base,
-                   Additions& added, const RunContext& context) {
-  switch (brought.kind) {
-    case BroughtKind::kMesh:
-      return OpenMesh(request, brought.path, base, added);
-    case BroughtKind::kVolume:
-      return OpenVolume(request, brought.path, base, added, context);
-    case BroughtKind::kConfig:
-      return OpenConfig(request, brought.path, base, added, context);
-    case BroughtKind::kLandmarks:
-      return OpenLandmarks(request, brought.path, base);
+Opened OpenByKind(const OpenRequest& request, const ImportedFile& file, const OpenBase& base,
+                  Additions& added, const RunContext& context) {
+  switch (file.kind) {
+    case ImportKind::kMesh:
+      return OpenMesh(request, file.path, base, added);
+    case ImportKind::kVolume:
+      return OpenVolume(request, file.path, base, added, context);
+    case ImportKind::kConfig:
+      return OpenConfig(request, file.path, base, added, context);
+    case ImportKind::kLandmarks:
+      return OpenLandmarks(request, file.path, base);
   }
   return {};
 }
 
-void CheckWay(const OpenRequest& request, const Brought& brought) {
-  const std::vector<OpenAs> ways = WaysToOpen(brought.kind);
+void CheckOpenAs(const OpenRequest& request, const ImportedFile& file) {
+  const std::vector<OpenAs> ways = WaysToOpen(file.kind);
   if (std::ranges::find(ways, request.as) == ways.end()) {
-    throw InputError(fmt::format("{}: {} cannot be opened as {}", brought.path.string(),
-                                 WordOf(brought.kind), WordOf(request.as)));
+    throw InputError(fmt::format("{}: {} cannot be opened as {}", file.path.string(),
+                                 EnumWord(file.kind), EnumWord(request.as)));
   }
 }
 
 }  // namespace
 
-std::vector<OpenAs> WaysToOpen(BroughtKind kind) {
+std::vector<OpenAs> WaysToOpen(ImportKind kind) {
   switch (kind) {
-    case BroughtKind::kMesh:
+    case ImportKind::kMesh:
       return {OpenAs::kHead, OpenAs::kSkull, OpenAs::kSkin};
-    case BroughtKind::kVolume:
+    case ImportKind::kVolume:
       return {OpenAs::kHead, OpenAs::kSkin};
-    case BroughtKind::kConfig:
+    case ImportKind::kConfig:
       return {OpenAs::kHead, OpenAs::kOptions};
-    case BroughtKind::kLandmarks:
+    case ImportKind::kLandmarks:
       return {OpenAs::kLandmarks};
   }
   return {};
 }
 
-Brought LookAtBrought(const fs::path& path) {
+ImportedFile IdentifyImport(const fs::path& path) {
   std::error_code error;
   const fs::file_status status = fs::status(path, error);
   if (path.empty() || !fs::exists(status)) {
     throw IoError(
-        fmt::format("{}: no such file or folder on this machine; give the whole path, or "
-                    "choose the file",
+        fmt::format("{}: no such file or folder on this machine; give the full path, or choose the "
+                    "file",
                     path.string()));
   }
-  return fs::is_directory(status) ? LookAtFolder(path) : LookAtFile(path);
+  return fs::is_directory(status) ? IdentifyFolder(path) : IdentifyFile(path);
 }
 
-void OpenBrought(const OpenRequest& request, const OpenBase& base, const RunContext& context,
-                 const std::function<void(Opened)>& take) {
+void OpenImportedFile(const OpenRequest& request, const OpenBase& base, const RunContext& context,
+                      const std::function<void(Opened)>& commit) {
   context.Report("look");
-  const Brought brought = LookAtBrought(request.path);
-  CheckWay(request, brought);
-  const fs::path batch = BatchOf(base.folder.Root(), brought.path);
+  const ImportedFile file = IdentifyImport(request.path);
+  CheckOpenAs(request, file);
+  const fs::path batch = FindBatch(base.folder.Root(), file.path);
   try {
     Additions added(base.folder);
-    Opened opened = OpenAsAsked(request, brought, base, added, context);
-    const std::string name = batch == brought.path ? "slices" : brought.path.filename().string();
-    opened.what = fmt::format("opened {} as {}", name, WordOf(request.as));
-    take(std::move(opened));
+    Opened opened = OpenByKind(request, file, base, added, context);
+    const std::string name = batch == file.path ? "slices" : file.path.filename().string();
+    opened.what = fmt::format("opened {} as {}", name, EnumWord(request.as));
+    commit(std::move(opened));
     added.Keep();
   } catch (const Error& error) {
-    if (batch.empty() || brought.kind != BroughtKind::kConfig) {
+    if (batch.empty() || file.kind != ImportKind::kConfig) {
       throw;
     }
     throw InputError(fmt::format(
-        "{}\nBring the files that it names together with it, or give its path on this machine.",
+        "{}\nUpload the files that it names together with it, or give its path on this machine.",
         error.what()));
   }
   if (!batch.empty()) {

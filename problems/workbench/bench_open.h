@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Opening what a person brings to a workbench that is at work: a mesh, a volume, a configuration,
-// landmarks.
+// Opens a file or a folder in a running workbench: a mesh, a volume, a configuration or landmarks.
 #pragma once
 
 #include <array>
@@ -17,44 +16,44 @@
 
 namespace semblance {
 
-enum class BroughtKind { kMesh, kVolume, kConfig, kLandmarks };
-constexpr auto EnumNames(BroughtKind) {
+enum class ImportKind { kMesh, kVolume, kConfig, kLandmarks };
+constexpr auto EnumNames(ImportKind) {
   return std::to_array<std::string_view>({"mesh", "volume", "config", "landmarks"});
 }
 
-struct Brought {
-  BroughtKind kind = BroughtKind::kMesh;
-  std::filesystem::path path;  // what is opened: of files brought together, the one that counts
+struct ImportedFile {
+  ImportKind kind = ImportKind::kMesh;
+  std::filesystem::path path;  // the file to open; in a folder of several files, the main one
 };
 
-// What a file or a folder is, by its name and its first bytes. Of a folder: the one configuration
-// in it, else the one file in it that can be opened, else the slices of a volume. Throws IoError or
-// InputError with one line that says what can be opened instead.
-Brought LookAtBrought(const std::filesystem::path& path);
+// Finds the kind of a file by its name and its first bytes. In a folder it picks the one
+// configuration, else the one file that can be opened, else it takes the folder as the slices of a
+// volume. Throws IoError or InputError with one line that lists what can be opened.
+ImportedFile IdentifyImport(const std::filesystem::path& path);
 
-// As what it is taken.
+// The role of an opened file.
 enum class OpenAs {
-  kHead,       // a mesh of a skull, a CT, a configuration: another head, in place of this one
-  kSkull,      // a mesh: of this head, its landmarks stay
-  kSkin,       // a mesh, or the skin in a volume, in the frame of this head's skull
-  kOptions,    // a configuration's options, for this head
-  kLandmarks,  // in place of those that are there
+  kHead,       // a mesh of a skull, a CT or a configuration: replaces the head
+  kSkull,      // a mesh: replaces the skull, the landmarks stay
+  kSkin,       // a mesh, or the skin in a volume, in the frame of the present skull
+  kOptions,    // a configuration: its options for the present head
+  kLandmarks,  // replace the present landmarks
 };
 constexpr auto EnumNames(OpenAs) {
   return std::to_array<std::string_view>({"head", "skull", "skin", "options", "landmarks"});
 }
 
-// What can be made of that kind; the first is the usual one.
-std::vector<OpenAs> WaysToOpen(BroughtKind kind);
+// The roles that a kind of file may have; the first is the default.
+std::vector<OpenAs> WaysToOpen(ImportKind kind);
 
 struct OpenRequest {
   std::filesystem::path path;
   OpenAs as = OpenAs::kHead;
-  CtSubject volume;          // how a volume is read; its path counts not
-  std::optional<Axes> axes;  // of landmarks whose file does not say
+  CtSubject volume;          // options for reading a volume; its path is ignored
+  std::optional<Axes> axes;  // of landmarks whose file does not state them
 };
 
-// What an opening starts from.
+// The workbench before the opening.
 struct OpenBase {
   const BenchFolder& folder;
   const BenchState& state;
@@ -62,16 +61,16 @@ struct OpenBase {
 };
 
 struct Opened {
-  std::string what;                // for the history
-  BenchState state;                // after it
-  std::vector<std::string> notes;  // what people should know of how it was read
+  std::string what;                // description for the history
+  BenchState state;                // after the opening
+  std::vector<std::string> notes;  // remarks on reading the file, for people
 };
 
-// Reads what was brought and hands the new state to `take`. Files that the state needs are put into
-// the folder under names that are free; they are gone again if anything throws, `take` too. What
-// the browser had sent is forgotten once it is opened. Throws as ReadVolume, ImportCt, ReadConfig,
-// ReadLandmarks and `take`; InputError for a kind that cannot be taken so.
-void OpenBrought(const OpenRequest& request, const OpenBase& base, const RunContext& context,
-                 const std::function<void(Opened)>& take);
+// Reads the file and passes the new state to `commit`. Files that the state needs are added to the
+// folder under free names; they are removed again if anything throws, `commit` included. An upload
+// of the browser is deleted once it is opened. Throws as ReadVolume, ImportCt, ReadConfig,
+// ReadLandmarks and `commit`; InputError if the kind of file cannot have the requested role.
+void OpenImportedFile(const OpenRequest& request, const OpenBase& base, const RunContext& context,
+                      const std::function<void(Opened)>& commit);
 
 }  // namespace semblance

@@ -24,7 +24,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kSkullTriangles = 60000;  // landmarks are clicked on it
+// Of the shown skull. Landmarks are clicked on it: fewer triangles move them off the true bone,
+// more make the page slow.
+constexpr int kSkullTriangles = 60000;
 
 TriMesh ReadInMm(const fs::path& path, const FileSubject& files) {
   TriMesh mesh = ReadMesh(path);
@@ -34,7 +36,7 @@ TriMesh ReadInMm(const fs::path& path, const FileSubject& files) {
   return mesh;
 }
 
-void Append(const TriMesh& more, TriMesh& mesh) {
+void AppendMesh(const TriMesh& more, TriMesh& mesh) {
   const auto first = static_cast<std::int32_t>(mesh.points.size());
   mesh.points.insert(mesh.points.end(), more.points.begin(), more.points.end());
   for (const Triangle& t : more.triangles) {
@@ -42,8 +44,8 @@ void Append(const TriMesh& more, TriMesh& mesh) {
   }
 }
 
-// A fault is told and does not hinder looking.
-void Check(const TriMesh& mesh, const fs::path& path, BenchSubject& subject) {
+// Adds faults of the mesh to the subject instead of throwing, so that the page can show the mesh.
+void CheckMesh(const TriMesh& mesh, const fs::path& path, BenchSubject& subject) {
   try {
     std::ranges::move(CheckHeadMesh(mesh, path.filename().string()),
                       std::back_inserter(subject.notes));
@@ -52,9 +54,9 @@ void Check(const TriMesh& mesh, const fs::path& path, BenchSubject& subject) {
   }
 }
 
-void TakeLandmarksOf(const fs::path& path, BenchState& state) {
+void AddLandmarks(const fs::path& path, BenchState& state) {
   if (!path.empty()) {
-    state = TakeLandmarks(std::move(state), ReadLandmarks(path).file);
+    state = ReplaceLandmarks(std::move(state), ReadLandmarks(path).file);
   }
 }
 
@@ -70,7 +72,7 @@ FileSubject WriteMeshes(const TriMesh& skull, const TriMesh& skin, const fs::pat
 
 FileSubject ToFiles(const FileSubject& subject, const fs::path&, BenchState& state,
                     const RunContext&, std::vector<std::string>&) {
-  TakeLandmarksOf(subject.landmarks, state);
+  AddLandmarks(subject.landmarks, state);
   FileSubject files = subject;
   files.landmarks.clear();
   return files;
@@ -79,7 +81,7 @@ FileSubject ToFiles(const FileSubject& subject, const fs::path&, BenchState& sta
 FileSubject ToFiles(const PhantomOptions& subject, const fs::path& meshes, BenchState& state,
                     const RunContext&, std::vector<std::string>&) {
   const Phantom phantom = MakePhantom(subject);
-  state = TakeLandmarks(std::move(state), PhantomLandmarks(phantom, subject.random_seed));
+  state = ReplaceLandmarks(std::move(state), PhantomLandmarks(phantom, subject.random_seed));
   return WriteMeshes(phantom.skull, phantom.face, meshes);
 }
 
@@ -87,15 +89,15 @@ FileSubject ToFiles(const CtSubject& subject, const fs::path& meshes, BenchState
                     const RunContext& context, std::vector<std::string>& notes) {
   const VolumeReading reading = ReadVolume(subject.volume, subject.read, context);
   if (reading.modality == Modality::kMr) {
-    throw InputError(
-        fmt::format("{}: an MR shows no bone, and the workbench needs a skull: give a CT, or a "
-                    "mesh of the skull; the skin of an MR can be opened beside that",
-                    subject.volume.string()));
+    throw InputError(fmt::format(
+        "{}: an MR shows no bone, and the workbench needs a skull; give a CT or a mesh of "
+        "the skull first, and open the MR as its skin afterwards",
+        subject.volume.string()));
   }
   const CtImport import = ImportCt(reading.volume, subject.import, context);
   notes = reading.notes;
   notes.insert(notes.end(), import.notes.begin(), import.notes.end());
-  TakeLandmarksOf(subject.landmarks, state);
+  AddLandmarks(subject.landmarks, state);
   FileSubject files = WriteMeshes(import.skull, import.skin, meshes);
   files.mirror = subject.mirror;
   return files;
@@ -107,13 +109,27 @@ bool IsOneOf(const std::string& extension, std::initializer_list<const char*> ex
   return std::ranges::find(extensions, extension) != extensions.end();
 }
 
-// What a person gets who brings no configuration.
-Experiment UsualExperiment(const fs::path& folder) {
+// The experiment of a workbench that begins without a configuration.
+Experiment DefaultExperiment(const fs::path& folder) {
   Experiment experiment;
   experiment.title = "Workbench";
   experiment.tissue.table = folder / "tables/rhine_caucasoid.yaml";
   experiment.network = folder / "networks/standard32.yaml";
   return experiment;
+}
+
+Subject SubjectFromSource(const fs::path& source) {
+  FileSubject files;
+  if (source.empty()) {
+    return files;
+  }
+  if (IsOneOf(LowerExtension(source), {".ply", ".obj", ".stl", ".off"})) {
+    files.skull = fs::absolute(source);
+    return files;
+  }
+  CtSubject ct;
+  ct.volume = fs::absolute(source);
+  return ct;
 }
 
 }  // namespace
@@ -126,16 +142,16 @@ BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& contex
   context.Report("read skull");
   subject.skull.mesh = ReadInMm(files.skull, files);
   if (!files.mandible.mesh.empty()) {
-    Append(ReadInMm(files.mandible.mesh, files), subject.skull.mesh);
+    AppendMesh(ReadInMm(files.mandible.mesh, files), subject.skull.mesh);
   }
-  Check(subject.skull.mesh, files.skull, subject);
+  CheckMesh(subject.skull.mesh, files.skull, subject);
   subject.skull.view = ForView(subject.skull.mesh, kSkullTriangles);
   subject.bone = std::make_shared<const MeshQuery>(subject.skull.mesh);
   subject.view_bone = std::make_shared<const MeshQuery>(subject.skull.view);
   if (!files.skin.empty()) {
     context.Report("read skin");
     BenchMesh skin{.mesh = ReadInMm(files.skin, files), .view = {}};
-    Check(skin.mesh, files.skin, subject);
+    CheckMesh(skin.mesh, files.skin, subject);
     skin.view = ForView(skin.mesh);
     subject.skin = std::move(skin);
   }
@@ -164,33 +180,15 @@ BenchBeginning BeginFromConfig(const fs::path& config, const fs::path& meshes,
   return beginning;
 }
 
-namespace {
-
-Subject SubjectIn(const fs::path& source) {
-  FileSubject files;
-  if (source.empty()) {
-    return files;
-  }
-  if (IsOneOf(LowerExtension(source), {".ply", ".obj", ".stl", ".off"})) {
-    files.skull = fs::absolute(source);
-    return files;
-  }
-  CtSubject ct;
-  ct.volume = fs::absolute(source);
-  return ct;
-}
-
-}  // namespace
-
 BenchBeginning BeginBench(const fs::path& source, const fs::path& folder,
                           const RunContext& context) {
   const fs::path meshes = folder / "subject";
   if (IsOneOf(LowerExtension(source), {".yaml", ".yml"})) {
     return BeginFromConfig(source, meshes, context);
   }
-  BenchBeginning beginning{.experiment = UsualExperiment(folder), .state = {}, .notes = {}};
+  BenchBeginning beginning{.experiment = DefaultExperiment(folder), .state = {}, .notes = {}};
   beginning.experiment.subject =
-      SubjectAsFiles(SubjectIn(source), meshes, beginning.state, context, beginning.notes);
+      SubjectAsFiles(SubjectFromSource(source), meshes, beginning.state, context, beginning.notes);
   beginning.state.subject = source.empty() ? "subject" : PlainName(source);
   return beginning;
 }

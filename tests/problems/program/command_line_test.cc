@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The program as users meet it: its words and exit codes, and what it leaves behind.
+// The whole program: messages, exit codes and files.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -44,7 +44,7 @@ class CommandLine : public ::testing::Test {
 
   Outcome Call(const std::string& arguments) { return testing::CallProgram(folder_, arguments); }
 
-  // One line of error, exit code 2, and no folder `out`.
+  // Expects one line of error, exit code 2, and no result in `out`.
   void ExpectRefused(const std::string& arguments, const std::string& words) {
     const Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
@@ -57,7 +57,7 @@ class CommandLine : public ::testing::Test {
     WriteFileAtomically(folder_ / name, text);
   }
 
-  // A configuration of a ball for a skull, with one landmark.
+  // Writes a configuration whose skull is a ball with one landmark.
   void WriteBall(const Vec3& landmark) {
     Write("skull.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 80, 40), ".ply"));
     Write("marks.yaml", fmt::format("subject: ball\nunits: mm\naxes: LPS\nlandmarks:\n"
@@ -72,7 +72,7 @@ class CommandLine : public ::testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(CommandLine, AMetricThatNoTrialHasIsSaidAndNothingIsRanked) {
+TEST_F(CommandLine, AMissingMetricIsReportedAndNothingIsRanked) {
   Write("study.yaml", fmt::format("base: {}/phantom.yaml\nset: {{subject.rings: 20}}\njob: depth\n"
                                   "metric: cross_validation.landmark.sites.nonsense\n",
                                   kConfigs));
@@ -83,7 +83,7 @@ TEST_F(CommandLine, AMetricThatNoTrialHasIsSaidAndNothingIsRanked) {
   EXPECT_EQ(Call("status s").code, 1);
 }
 
-// Ceres tells a line search of a flat cost through glog, which would tell it on the terminal.
+// Ceres reports the line search of a flat cost through glog, which would print it on the terminal.
 TEST_F(CommandLine, LibrariesAreSilent) {
   const Outcome outcome = Call("depth " + kConfigs +
                                "/phantom.yaml --out d --quiet --set subject.rings=30 --set "
@@ -92,7 +92,7 @@ TEST_F(CommandLine, LibrariesAreSilent) {
   EXPECT_EQ(outcome.err, "");
 }
 
-TEST_F(CommandLine, AStudysPlanIsListedAndNothingRuns) {
+TEST_F(CommandLine, ThePlanOfAStudyIsPrintedWithoutARun) {
   Write("study.yaml", fmt::format("base: {}/phantom.yaml\ngrid: {{rounds: [1, 2]}}\n", kConfigs));
   const Outcome plan = Call("study plan study.yaml --out out");
   EXPECT_EQ(plan.code, 0) << plan.err;
@@ -103,23 +103,23 @@ TEST_F(CommandLine, AStudysPlanIsListedAndNothingRuns) {
   ExpectRefused("study study.yaml study.yaml", "one study at a time");
 }
 
-TEST_F(CommandLine, HelpAndVersionAreNoErrors) {
+TEST_F(CommandLine, HelpAndVersionExitWithZero) {
   EXPECT_EQ(Call("--help").code, 0);
   EXPECT_THAT(Call("--version").out, HasSubstr("semblance "));
   EXPECT_EQ(Call("").code, 2);
   EXPECT_EQ(Call("walk").code, 2);
 }
 
-TEST_F(CommandLine, RunWritesAReportAndSaysWhere) {
+TEST_F(CommandLine, RunWritesAReportAndPrintsItsPath) {
   const Outcome outcome = Call("run " + kConfigs + "/phantom.yaml --out out" + kQuick);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
-  EXPECT_THAT(outcome.out, AllOf(HasSubstr("H-spline face: mean "), HasSubstr("within 2.5 mm"),
+  EXPECT_THAT(outcome.out, AllOf(HasSubstr("recovered face: mean "), HasSubstr("within 2.5 mm"),
                                  HasSubstr("out/report.html")));
   EXPECT_TRUE(fs::exists(folder_ / "out" / "manifest.json"));
 }
 
-TEST_F(CommandLine, DepthSaysHowFarTheSchemeIsFromTheTruthAndFromLeftOutDowels) {
+TEST_F(CommandLine, DepthPrintsErrorsAgainstTheTruthAndLeftOutDowels) {
   const Outcome outcome = Call("depth " + kConfigs +
                                "/phantom.yaml --out depth --quiet --set subject.rings=30 "
                                "--set interp=network_spline");
@@ -140,7 +140,7 @@ TEST_F(CommandLine, DepthSaysHowFarTheSchemeIsFromTheTruthAndFromLeftOutDowels) 
                 "depth_map: no file is named");
 }
 
-TEST_F(CommandLine, AFolderThatExistsIsLeftAloneUnlessForced) {
+TEST_F(CommandLine, AnExistingFolderIsNotChangedWithoutForce) {
   const std::string run = "run " + kConfigs + "/phantom.yaml --out out" + kQuick;
   fs::create_directories(folder_ / "out");
   Write("out/mine.txt", "mine");
@@ -152,7 +152,7 @@ TEST_F(CommandLine, AFolderThatExistsIsLeftAloneUnlessForced) {
   EXPECT_THAT(ReadFileBytes(folder_ / "out" / "manifest.json"), Not(HasSubstr("mine.txt")));
 }
 
-TEST_F(CommandLine, AFolderDoesNotTakeWhatTheCommandReads) {
+TEST_F(CommandLine, InputFilesInTheFolderAreNotReplaced) {
   WriteBall({0, -80, 0});
   fs::create_directories(folder_ / "out");
   Write("out/depth.ply", "mine");
@@ -233,7 +233,7 @@ TEST_F(CommandLine, CheckFindsSidesThatAreSwapped) {
   }
 }
 
-// What they name is opened by `make configs`.
+// `make configs` opens the files that they name.
 TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
   std::string files;
   for (const std::string& folder : {kConfigs, kConfigs + "/fit", kConfigs + "/studies"}) {
@@ -246,7 +246,7 @@ TEST_F(CommandLine, ShippedConfigurationsHaveNoFault) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
 }
 
-TEST_F(CommandLine, CheckTellsAFitFromAnExperimentAndRefusesTheFaultsOfEither) {
+TEST_F(CommandLine, CheckDistinguishesFitsFromExperiments) {
   Write("fit.yaml", "patches_u: 4\nclosure: periodic_u\nfit: {plan: adaptive, terms: [points]}\n");
   EXPECT_EQ(Call("check fit.yaml").code, 0);
   Write("fit.yaml", "patches_u: 4\nclosure: periodic\nfit: {plan: adaptive, terms: [points]}\n");
@@ -255,7 +255,7 @@ TEST_F(CommandLine, CheckTellsAFitFromAnExperimentAndRefusesTheFaultsOfEither) {
   ExpectRefused("check both.yaml", "patches_u");
 }
 
-TEST_F(CommandLine, CheckTakesAStudyAndNamesItsFaults) {
+TEST_F(CommandLine, CheckReportsFaultsOfAStudy) {
   Write("study.yaml", fmt::format("base: {}/phantom.yaml\ngrid: {{rounds: [1, 2]}}\n", kConfigs));
   EXPECT_EQ(Call("check study.yaml").out, "study.yaml: no fault found\n");
   ExpectRefused("check study.yaml --set rounds=2", "write it into the study");
@@ -307,7 +307,7 @@ TEST_F(CommandLine, CheckWarnsOfATableWhoseDepthsDoNotGrowWithTheBuild) {
   EXPECT_THAT(Call("check e.yaml --set tissue.depths=measured").out, Not(HasSubstr("warning")));
 }
 
-TEST_F(CommandLine, CheckOpensEveryInputAndTellsEachFaultAtItsLine) {
+TEST_F(CommandLine, CheckOpensEveryInputAndReportsEachFaultWithItsLine) {
   Write("e.yaml", fmt::format("base: {}/phantom.yaml\n"
                               "network: nowhere.yaml\n"
                               "tissue: {{depths: table, table: none.yaml}}\n"
@@ -330,15 +330,16 @@ TEST_F(CommandLine, CheckOpensEveryInputAndTellsEachFaultAtItsLine) {
   EXPECT_THAT(Call("check s.yaml").err, HasSubstr("broken.yaml"));
 }
 
-TEST_F(CommandLine, AMistypedWordIsAnsweredWithTheNearest) {
+TEST_F(CommandLine, AMistypedWordGetsASuggestion) {
   EXPECT_THAT(Call("rnu e.yaml").err, HasSubstr("there is no command 'rnu'; did you mean 'run'?"));
   EXPECT_THAT(Call("run e.yaml --sett a=b").err,
               HasSubstr("run: there is no option '--sett'; did you mean '--set'?"));
   EXPECT_EQ(Call("rnu").code, 2);
 }
 
-// Every command that reads a file, with files of the wrong kind: a line of our own words.
-TEST_F(CommandLine, NoLibraryHasAWordInARefusal) {
+// Calls every command that reads a file with files of the wrong kind. Each message must come from
+// the program, not from a library.
+TEST_F(CommandLine, MessagesDoNotQuoteLibraries) {
   Write("mesh.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 82, 10), ".ply"));
   Write("empty.json", "");
   Write("map.json", "{}");
@@ -362,7 +363,7 @@ TEST_F(CommandLine, NoLibraryHasAWordInARefusal) {
   }
 }
 
-TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {
+TEST_F(CommandLine, TheTemplateIsWrittenAsAFileThatARunCanRead) {
   Write("e.yaml",
         "template: {type: formula, max_level: 1}\n"
         "fit: {plan: {type: coarse_to_fine, finest: 1}}\n");
@@ -378,7 +379,7 @@ TEST_F(CommandLine, TheGenericFaceIsWrittenAsAFileThatARunCanTake) {
   EXPECT_EQ(Call("template e.yaml --out generic").code, 2);
 }
 
-TEST_F(CommandLine, AHeadThatCannotBecomeATemplateLeavesNothingBehind) {
+TEST_F(CommandLine, AnUnusableHeadForATemplateLeavesNoFiles) {
   Write("ball.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 90, 20), ".ply"));
   Write("few.csv", "site,x,y,z\ng,0,-90,0\nn,0,-89,-10\n");
   const Outcome outcome = Call("template ball.ply few.csv --out made --quiet");
@@ -412,13 +413,13 @@ TEST_F(CommandLine, AnEmptyConfigurationIsNamedInItsRefusal) {
   ExpectRefused("depth empty.yaml --out out --quiet", "empty.yaml: network: no file is named");
 }
 
-TEST_F(CommandLine, AnOptionWithAnEmptyValueIsNotTakenForOneThatIsLeftOut) {
+TEST_F(CommandLine, AnEmptyValueOfAnOptionIsRefused) {
   Write("points.csv", "x,y,z\n0,0,0\n");
   ExpectRefused("fit points.csv --out ''", "--out is given an empty value");
   ExpectRefused("evaluate a.ply b.ply --landmarks ''", "--landmarks is given an empty value");
 }
 
-TEST_F(CommandLine, AFitOfFewPointsPrintsNoFigureThatItDoesNotHave) {
+TEST_F(CommandLine, AFitOfFewPointsPrintsNoNan) {
   std::string points = "x,y,z\n";
   for (int k = 0; k < 35; ++k) {
     points += fmt::format("{},{},{}\n", k % 7, k / 7, 0.1 * std::sin(k));
@@ -439,15 +440,14 @@ TEST_F(CommandLine, EvaluateMeasuresAnyTwoMeshes) {
   EXPECT_EQ(Call("evaluate a.ply none.ply").code, 2);
 }
 
-TEST_F(CommandLine, ReportOfAFolderThatIsNoRunIsRefused) {
+TEST_F(CommandLine, ReportRefusesAFolderThatIsNotARun) {
   EXPECT_EQ(Call("report nowhere").code, 2);
   fs::create_directories(folder_ / "empty");
   EXPECT_THAT(Call("report empty").err, HasSubstr("result.json"));
 }
 
-// A killed run leaves nothing under the name of its folder, and what it leaves beside is taken over
-// by the next one.
-TEST_F(CommandLine, AKilledRunLeavesNoFileAndTheNextOneClearsUp) {
+// A killed run leaves no folder of its name. The next run removes its temporary folder.
+TEST_F(CommandLine, AKilledRunLeavesNoFileAndTheNextOneCleansUp) {
   const std::string config = kConfigs + "/phantom.yaml", out = (folder_ / "out").string();
   const fs::path part = folder_ / ".out.semblance-part";
   const pid_t child = ::fork();

@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 using testing::ScratchFolder;
 using testing::WordsOf;
 
-// A phantom in files, as a user's head is.
+// A phantom in files, like the head of a user.
 class EvaluateFace : public ::testing::Test {
  protected:
   void SetUp() override {
@@ -56,7 +56,7 @@ class EvaluateFace : public ::testing::Test {
   void WriteBytes(const std::string& name, const std::string& bytes) {
     std::ofstream(folder_ / name, std::ios::binary) << bytes;
   }
-  EvaluateOptions OfRun() const {
+  EvaluateOptions OptionsOfRun() const {
     return {.face = folder_ / "face.hspline.json",
             .truth = {},
             .config = folder_ / "e.yaml",
@@ -68,25 +68,25 @@ class EvaluateFace : public ::testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(EvaluateFace, SaysWhatTheRunSaysToTheBit) {
+TEST_F(EvaluateFace, GivesTheNumbersOfTheRun) {
   const auto experiment = ReadConfig<Experiment>(folder_ / "e.yaml");
   const RunResult run = semblance::Run(experiment, {});
   WriteHSpline(folder_ / "face.hspline.json", run.fit.surface);
-  const auto told = ResultJson(experiment, run).at("face");
-  const auto by_config = nlohmann::ordered_json::parse(Evaluate(OfRun(), {}).dump());
-  EXPECT_EQ(by_config, told);
-  EXPECT_GT(told.at("scored_skin").at("masked_cm2"), 5);
+  const auto expected = ResultJson(experiment, run).at("face");
+  const auto by_config = nlohmann::ordered_json::parse(Evaluate(OptionsOfRun(), {}).dump());
+  EXPECT_EQ(by_config, expected);
+  EXPECT_GT(expected.at("scored_skin").at("masked_cm2"), 5);
 
-  EvaluateOptions by_files = OfRun();
+  EvaluateOptions by_files = OptionsOfRun();
   by_files.config.clear();
   by_files.truth = folder_ / "skin.ply";
   by_files.landmarks = folder_ / "marks.yaml";
   by_files.exclude = {ParseZone("zy_r=25")};
-  EXPECT_EQ(nlohmann::ordered_json::parse(Evaluate(by_files, {}).dump()), told);
+  EXPECT_EQ(nlohmann::ordered_json::parse(Evaluate(by_files, {}).dump()), expected);
 }
 
-TEST_F(EvaluateFace, RefusesWhatDoesNotGoTogether) {
-  EvaluateOptions options = OfRun();
+TEST_F(EvaluateFace, RefusesOptionsThatCannotBeCombined) {
+  EvaluateOptions options = OptionsOfRun();
   options.face = folder_ / "skin.ply";
   options.landmarks = folder_ / "marks.yaml";
   EXPECT_THAT(WordsOf<InputError>([&] { Evaluate(options, {}); }), HasSubstr("--landmarks"));

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands edit, export and feature as users meet them.
+// The commands edit, export and feature, called as a program.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -36,7 +36,7 @@ class FaceCommands : public ::testing::Test {
     EXPECT_EQ(outcome.err, "") << arguments;
   }
 
-  // One line of error, and exit code 2.
+  // Expects one line of error and exit code 2.
   void ExpectRefused(const std::string& arguments, const std::string& words) {
     const testing::Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
@@ -67,7 +67,7 @@ TEST_F(FaceCommands, EditMovesVerticesAndItsInverseMovesThemBack) {
   ExpectDone("edit face.json script.yaml --out back.json --inverse inverse.yaml --force");
 }
 
-TEST_F(FaceCommands, EditResetsARegionAndItsInverseBringsItBack) {
+TEST_F(FaceCommands, EditResetsARegionAndItsInverseRestoresIt) {
   WriteFileAtomically(folder_ / "reset.yaml", "resets:\n  - {u: [0, 0.5], v: [0, 1]}\n");
   ExpectDone("edit face.json reset.yaml --out smooth.json --inverse inverse.yaml");
   const HSplineSurface smooth = ReadHSpline(folder_ / "smooth.json");
@@ -90,7 +90,7 @@ TEST_F(FaceCommands, ExportsExactAndTriangulatedFaces) {
             ReadMesh(folder_ / "face.obj").triangles.size());
 }
 
-TEST_F(FaceCommands, APlyBearsTheCurvaturesOfTheSurface) {
+TEST_F(FaceCommands, APlyContainsTheCurvaturesOfTheSurface) {
   ExpectDone("export face.json --to coarse.ply --chord_mm 2");
   const auto scalar = [&](const char* name) {
     return PlyVertexScalar(Bytes("coarse.ply"), name, "coarse.ply");
@@ -108,7 +108,7 @@ TEST_F(FaceCommands, APlyBearsTheCurvaturesOfTheSurface) {
   EXPECT_EQ(scalar("quality"), mean);
 }
 
-TEST_F(FaceCommands, ExportsToCadOrSaysWhatIsMissing) {
+TEST_F(FaceCommands, ExportsToCadOrNamesTheMissingPart) {
   if (HasCad()) {
     ExpectDone("export face.json --to face.step");
     EXPECT_THAT(Bytes("face.step"), StartsWith("ISO-10303-21;"));
@@ -139,7 +139,7 @@ TEST_F(FaceCommands, AScaleOfModesIsAboveZeroAndBelowABillion) {
   }
 }
 
-TEST_F(FaceCommands, NothingThatIsReadIsReplaced) {
+TEST_F(FaceCommands, InputFilesAreNotReplaced) {
   const std::string words = ": this file is read, and input files are never replaced";
   WriteFileAtomically(folder_ / "script.yaml", "edits: []\n");
   ExpectDone("export face.json --to face.ply");
@@ -157,7 +157,7 @@ TEST_F(FaceCommands, NothingThatIsReadIsReplaced) {
   EXPECT_EQ(Bytes("face.json"), before);
 }
 
-TEST_F(FaceCommands, AFeatureGoesFromFaceToFace) {
+TEST_F(FaceCommands, AFeatureIsTransferredBetweenFaces) {
   ExpectDone("feature extract face.json --u 0.2 0.8 --levels 2 3 --name nose --library lib");
   const Feature nose = ReadFeature(folder_ / "lib/nose.json");
   const FeatureRegion region{.lowest_u = 0.2, .highest_u = 0.8, .first_level = 2, .last_level = 3};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The commands phantom and import-ct as users meet them, from the scanner's files to a face.
+// The commands phantom and import-ct, called as a program, from the scanner's files to a face.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,7 +24,7 @@ class ImportCommands : public ::testing::Test {
   void SetUp() override {
     ASSERT_EQ(CallProgram(folder_, "phantom --out head --pixel-mm 2.5 --slice-mm 3").code, 0);
   }
-  // One line, exit code 2, nothing left behind.
+  // Expects one line of error, exit code 2, and no new files.
   void ExpectRefused(const std::string& arguments, const std::string& words) {
     const testing::Outcome outcome = CallProgram(folder_, arguments + " --quiet --out out");
     EXPECT_EQ(outcome.code, 2) << arguments;
@@ -35,7 +35,7 @@ class ImportCommands : public ::testing::Test {
   testing::ScratchFolder folder_;
 };
 
-TEST_F(ImportCommands, ASeriesBecomesSkullAndSkinAndTheNextCommandIsTold) {
+TEST_F(ImportCommands, ASeriesBecomesSkullAndSkinAndTheNextCommandIsPrinted) {
   const testing::Outcome outcome = CallProgram(folder_, "import-ct head/ct --quiet --out out");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_TRUE(fs::exists(folder_ / "out/skull.ply"));
@@ -44,7 +44,7 @@ TEST_F(ImportCommands, ASeriesBecomesSkullAndSkinAndTheNextCommandIsTold) {
                                  HasSubstr("next: pick landmarks on skull.ply")));
 }
 
-TEST_F(ImportCommands, TheSkinAloneIsTakenWhereAnMrIsMeant) {
+TEST_F(ImportCommands, OnlyTheSkinOfAnMrIsImported) {
   const testing::Outcome outcome =
       CallProgram(folder_, "import-ct head/ct --modality mr --skin-value 1 --quiet --out out");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
@@ -52,7 +52,7 @@ TEST_F(ImportCommands, TheSkinAloneIsTakenWhereAnMrIsMeant) {
   EXPECT_TRUE(fs::exists(folder_ / "out/skin.ply"));
 }
 
-TEST_F(ImportCommands, WrongInputIsOneLine) {
+TEST_F(ImportCommands, WrongInputGivesOneLine) {
   ExpectRefused("import-ct nowhere", "nowhere: no such file or folder");
   ExpectRefused("import-ct head/landmarks.yaml", "not a kind of volume");
   ExpectRefused("import-ct head/ct/slice0001.dcm", "name its folder");
@@ -73,7 +73,7 @@ TEST_F(ImportCommands, AHeadThatCannotBeMadeLeavesNoFolder) {
   }
 }
 
-TEST_F(ImportCommands, AHeadMayHaveTheBoneOfPeople) {
+TEST_F(ImportCommands, AHeadMayHaveRoughBone) {
   const auto bytes = [&](const char* path) { return ReadFileBytes(folder_ / path); };
   ASSERT_EQ(
       CallProgram(folder_, "phantom --out rough --bone like_people --pixel-mm 2.5 --slice-mm 3")

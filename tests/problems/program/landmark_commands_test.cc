@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The command landmarks as users meet it.
+// The command landmarks, called as a program.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -30,7 +30,7 @@ TEST_F(LandmarkCommands, ConvertsThereAndBack) {
   EXPECT_EQ(file.landmarks.at(1).point, (std::array{-4.0, -5.0, 6.0}));
 }
 
-TEST_F(LandmarkCommands, ReplacesNothingUnasked) {
+TEST_F(LandmarkCommands, ReplacesFilesOnlyWithForce) {
   WriteFileAtomically(folder_ / "a.pp", "mine");
   const testing::Outcome refused = testing::CallProgram(folder_, "landmarks convert in.csv a.pp");
   EXPECT_EQ(refused.code, 2);
@@ -39,7 +39,7 @@ TEST_F(LandmarkCommands, ReplacesNothingUnasked) {
   EXPECT_EQ(testing::CallProgram(folder_, "landmarks convert in.csv a.pp --force").code, 0);
 }
 
-TEST_F(LandmarkCommands, WhatIsReadIsNotReplacedEvenIfAsked) {
+TEST_F(LandmarkCommands, InputFilesAreNotReplacedEvenWithForce) {
   const std::string before = ReadFileBytes(folder_ / "in.csv");
   for (const char* arguments :
        {"convert in.csv ./in.csv --force",
@@ -53,7 +53,7 @@ TEST_F(LandmarkCommands, WhatIsReadIsNotReplacedEvenIfAsked) {
   EXPECT_EQ(ReadFileBytes(folder_ / "in.csv"), before);
 }
 
-TEST_F(LandmarkCommands, WritesNothingWhereANameIsNoSite) {
+TEST_F(LandmarkCommands, WritesNothingIfANameIsNotASite) {
   WriteFileAtomically(folder_ / "odd.csv", "site,x,y,z\nF-1,1,2,3\ng,0,0,0\n");
   EXPECT_EQ(testing::CallProgram(folder_, "landmarks convert odd.csv out.yaml").code, 2);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "out.yaml"));
@@ -63,7 +63,7 @@ TEST_F(LandmarkCommands, WritesNothingWhereANameIsNoSite) {
   EXPECT_THAT(kept.err, HasSubstr("left out: 'F-1'"));
 }
 
-TEST_F(LandmarkCommands, AProposalSaysThatItIsOneAndReplacesNothingUnasked) {
+TEST_F(LandmarkCommands, AProposalIsMarkedAndReplacesFilesOnlyWithForce) {
   const TriMesh skull = MakePhantom({.random_seed = 4, .rings = 40}).skull;
   WriteFileAtomically(folder_ / "skull.ply", EncodeMesh(skull, ".ply"));
   ASSERT_EQ(testing::CallProgram(folder_, "landmarks propose skull.ply --quiet").code, 0);
@@ -75,7 +75,7 @@ TEST_F(LandmarkCommands, AProposalSaysThatItIsOneAndReplacesNothingUnasked) {
   EXPECT_THAT(again.err, HasSubstr("it exists"));
 }
 
-TEST_F(LandmarkCommands, AProposalOnARasSkullIsTurnedWhereTheFileCannotSayRas) {
+TEST_F(LandmarkCommands, AProposalOnARasSkullIsTurnedIfTheFileCannotStateRas) {
   TriMesh skull = MakePhantom({.random_seed = 4, .rings = 40}).skull;
   for (Vec3& p : skull.points) {
     p = ToLps(p, Axes::kRas);

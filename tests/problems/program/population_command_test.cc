@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The command population as users meet it: what it prints, and its exit code.
+// The command population, called as a program: its output and exit code.
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -28,7 +28,7 @@ class PopulationCommand : public ::testing::Test {
                                     title, count));
   }
 
-  // Heads without landmarks, which nobody can propose.
+  // Heads without landmarks, which cannot be proposed for them either.
   void WriteUnmarkedHeads(int count) {
     for (int k = 1; k <= count; ++k) {
       const Phantom phantom =
@@ -43,7 +43,7 @@ class PopulationCommand : public ::testing::Test {
   testing::ScratchFolder folder_;
 };
 
-TEST_F(PopulationCommand, OfTooFewTellsEachFailureAndIsNotUsable) {
+TEST_F(PopulationCommand, TooFewSubjectsAreNotUsableAndEachFailureIsPrinted) {
   WriteUnmarkedHeads(3);
   const testing::Outcome outcome = Call("heads --out out");
   EXPECT_EQ(outcome.code, 1) << outcome.err;
@@ -55,7 +55,7 @@ TEST_F(PopulationCommand, OfTooFewTellsEachFailureAndIsNotUsable) {
   EXPECT_FALSE(fs::exists(folder_ / "out/table.yaml"));
 }
 
-TEST_F(PopulationCommand, AShardTellsItsOwnFailuresEachTime) {
+TEST_F(PopulationCommand, AShardPrintsItsOwnFailuresEachTime) {
   WriteUnmarkedHeads(3);
   for (const char* call : {"first", "again, when they are there already"}) {
     const testing::Outcome outcome = Call("heads --out out --shard 0/2");
@@ -65,7 +65,7 @@ TEST_F(PopulationCommand, AShardTellsItsOwnFailuresEachTime) {
   }
 }
 
-TEST_F(PopulationCommand, ListTellsWhatIsPassedOver) {
+TEST_F(PopulationCommand, ListPrintsSkippedFolders) {
   WriteUnmarkedHeads(1);
   fs::create_directories(folder_ / "heads/scans");
   const testing::Outcome outcome = Call("heads --list");
@@ -74,7 +74,7 @@ TEST_F(PopulationCommand, ListTellsWhatIsPassedOver) {
   EXPECT_THAT(outcome.out, HasSubstr("1 subjects"));
 }
 
-TEST_F(PopulationCommand, GoesOnInItsOwnFolderAndReplacesNothingElseUnlessAsked) {
+TEST_F(PopulationCommand, ContinuesInItsFolderAndReplacesOtherFilesOnlyWithForce) {
   WriteCrowd("three.yaml", "three", 3);
   WriteCrowd("four.yaml", "four", 4);
   EXPECT_EQ(Call("three.yaml --out out").code, 0);
@@ -94,7 +94,7 @@ TEST_F(PopulationCommand, GoesOnInItsOwnFolderAndReplacesNothingElseUnlessAsked)
   EXPECT_EQ(ReadFileBytes(folder_ / "foreign/table.yaml"), table);
 }
 
-// What is read is never replaced, with --force or without.
+// Input files are never replaced, with --force or without.
 TEST_F(PopulationCommand, NeverReplacesTheSubjectsCsvThatItReads) {
   WriteUnmarkedHeads(3);
   WriteFileAtomically(folder_ / "heads/subjects.csv", "name,bmi\ns1,20\n");
@@ -104,7 +104,7 @@ TEST_F(PopulationCommand, NeverReplacesTheSubjectsCsvThatItReads) {
   EXPECT_EQ(ReadFileBytes(folder_ / "heads/subjects.csv"), "name,bmi\ns1,20\n");
 }
 
-TEST_F(PopulationCommand, RefusesToGatherFromWhatIsNotThere) {
+TEST_F(PopulationCommand, RefusesToGatherFromAMissingFolder) {
   WriteCrowd("three.yaml", "three", 3);
   const testing::Outcome outcome = Call("three.yaml --out out --from nowhere");
   EXPECT_EQ(outcome.code, 2);

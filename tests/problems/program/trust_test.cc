@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the program does where something goes wrong around it: kills, signals, a second process, no
-// memory, no room, names and files that no program expects. None ends in a crash or loses a file.
+// The program under adverse conditions: kills, signals, a second process, no memory, a full disk,
+// strange names and files. No test may crash the program or lose a file.
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -35,11 +35,11 @@ using testing::ScratchFolder;
 using Clock = std::chrono::steady_clock;
 
 const std::string kPhantom = SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml";
-// A second or less of work.
+// Runs a second or less.
 const std::string kDepth = "depth " + kPhantom + " --set subject.rings=20 --quiet";
 
 #ifdef SEMBLANCE_SANITIZED
-constexpr bool kMemoryHasLimits = false;  // a sanitizer's has none
+constexpr bool kMemoryHasLimits = false;  // a sanitizer ignores the limits
 #else
 constexpr bool kMemoryHasLimits = true;
 #endif
@@ -54,7 +54,7 @@ class Trust : public ::testing::Test {
     return testing::CallProgram(folder_, arguments, before);
   }
 
-  // One line of error and this exit code; nothing at `out`.
+  // Expects one line of error, this exit code, and no folder `out`.
   void ExpectRefused(const std::string& arguments, const std::string& words, int code = 2,
                      const std::string& before = "") {
     const Outcome outcome = Call(arguments, before);
@@ -70,7 +70,7 @@ class Trust : public ::testing::Test {
     WriteFileAtomically(folder_ / name, text);
   }
 
-  // Starts the program in the folder, words apart, and lets it run.
+  // Starts the program in the folder with these arguments and does not wait for it.
   pid_t Start(const std::vector<std::string>& words) {
     const std::string folder = folder_.Path().string();
     std::vector<char*> argv = {const_cast<char*>("semblance")};
@@ -95,7 +95,7 @@ class Trust : public ::testing::Test {
     ASSERT_TRUE(fs::exists(path)) << path;
   }
 
-  // Before, a signal would end the program where it stands, whatever the program does with it.
+  // Waits until the program has installed its handler. An earlier signal would end it at once.
   static void WaitUntilCaught(pid_t child, int signal) {
     const Clock::time_point start = Clock::now();
     while (!Catches(child, signal) && SecondsSince(start) < 60) {
@@ -104,7 +104,7 @@ class Trust : public ::testing::Test {
     ASSERT_TRUE(Catches(child, signal));
   }
 
-  // By what the kernel says of the process: a bit per signal, from the lowest.
+  // Reads the kernel's bit mask of caught signals of the process; the lowest bit is signal 1.
   static bool Catches(pid_t child, int signal) {
     std::ifstream status(fmt::format("/proc/{}/status", child));
     for (std::string line; std::getline(status, line);) {
@@ -115,7 +115,7 @@ class Trust : public ::testing::Test {
     return false;
   }
 
-  static int CodeOf(pid_t child) {
+  static int ExitCode(pid_t child) {
     int status = 0;
     ::waitpid(child, &status, 0);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
@@ -124,9 +124,9 @@ class Trust : public ::testing::Test {
   ScratchFolder folder_;
 };
 
-// ------------------------------------------------------------------ nothing is lost
+// ------------------------------------------------------------------ no files are lost
 
-TEST_F(Trust, OfTwoProcessesOnOneFolderTheSecondIsRefused) {
+TEST_F(Trust, ASecondProcessOnAFolderIsRefused) {
   const pid_t first = Start({"run", kPhantom, "--out", "out", "--quiet"});
   WaitFor(folder_ / ".out.semblance-part");
   for (const std::string force : {"", " --force"}) {
@@ -135,7 +135,7 @@ TEST_F(Trust, OfTwoProcessesOnOneFolderTheSecondIsRefused) {
     EXPECT_THAT(second.err, HasSubstr("out: another process is writing it"));
   }
   ::kill(first, SIGKILL);
-  CodeOf(first);
+  ExitCode(first);
   EXPECT_EQ(Call(kDepth + " --out out").code, 0) << "a dead process holds nothing";
 }
 
@@ -143,12 +143,12 @@ TEST_F(Trust, ARefusalLeavesNoFolder) {
   ExpectRefused(kDepth + " --out out/a/b --set landmarks.max_distance_mm=0", "max_distance_mm");
 }
 
-// Half of a CT would be read as a shorter one.
+// An incomplete CT would be read as a shorter one.
 TEST_F(Trust, AKilledPhantomLeavesNoPartOfAHead) {
   const pid_t child = Start({"phantom", "--out", "out", "--pixel-mm", "2", "--slice-mm", "3"});
   WaitFor(folder_ / ".out.semblance-part");
   ::kill(child, SIGKILL);
-  CodeOf(child);
+  ExitCode(child);
   EXPECT_FALSE(fs::exists(folder_ / "out"));
   EXPECT_EQ(Call("phantom --out out --pixel-mm 5 --slice-mm 10").code, 0);
   EXPECT_FALSE(fs::exists(folder_ / ".out.semblance-part"));
@@ -156,11 +156,11 @@ TEST_F(Trust, AKilledPhantomLeavesNoPartOfAHead) {
 }
 
 TEST_F(Trust, AFullDiskLeavesNoFolderAndTheOldFiles) {
-  const std::string no_room = "ulimit -f 20;";  // in blocks of 512 or 1024 bytes
-  ExpectRefused(kDepth + " --out out", "cannot be written: File too large", 2, no_room);
+  const std::string small_disk = "ulimit -f 20;";  // in blocks of 512 or 1024 bytes
+  ExpectRefused(kDepth + " --out out", "cannot be written: File too large", 2, small_disk);
   ASSERT_EQ(Call(kDepth + " --out old").code, 0);
   const std::string before = ReadFileBytes(folder_ / "old/result.json");
-  EXPECT_EQ(Call(kDepth + " --set interp=nearest --out old --force", no_room).code, 2);
+  EXPECT_EQ(Call(kDepth + " --set interp=nearest --out old --force", small_disk).code, 2);
   EXPECT_EQ(ReadFileBytes(folder_ / "old/result.json"), before);
   EXPECT_FALSE(fs::exists(folder_ / "old/.semblance-part"));
 }
@@ -173,7 +173,7 @@ TEST_F(Trust, OneNameForTwoOutputsIsRefused) {
 
 // ------------------------------------------------------------------ no exception escapes
 
-TEST_F(Trust, NamesThatNoSystemTakesAreErrorsInOneLine) {
+TEST_F(Trust, InvalidNamesGiveOneLineOfError) {
   const std::string name(300, 'a');
   fs::create_symlink("loop", folder_ / "loop");
   for (const std::string& bad : {name, std::string("loop"), std::string("''")}) {
@@ -221,7 +221,7 @@ TEST_F(Trust, AStudysFilesMayHoldAnything) {
   }
 }
 
-TEST_F(Trust, TooLittleMemoryIsSaidWithWhatToAskFor) {
+TEST_F(Trust, LackOfMemoryIsReportedWithARemedy) {
   if (!kMemoryHasLimits) {
     GTEST_SKIP();
   }
@@ -230,8 +230,8 @@ TEST_F(Trust, TooLittleMemoryIsSaidWithWhatToAskFor) {
                 "ulimit -v 300000;");
 }
 
-// Where the libraries' own constructors find no memory, before the program's first line.
-TEST_F(Trust, TooLittleMemoryToBeginWithIsSaidToo) {
+// The constructors of the libraries run out of memory before the program's first line.
+TEST_F(Trust, LackOfMemoryBeforeMainIsReportedToo) {
   if (!kMemoryHasLimits) {
     GTEST_SKIP();
   }
@@ -246,8 +246,8 @@ TEST_F(Trust, TooLittleMemoryToBeginWithIsSaidToo) {
   for (int megabytes = enough - 1; megabytes > enough - 8; --megabytes) {
     const Outcome outcome = with(megabytes);
     EXPECT_THAT(outcome.code, AnyOf(1, 126, 127))
-        << megabytes;  // the last two: the system's loader
-    // The second is the Fortran runtime's, which some BLAS bring and which begins before main.
+        << megabytes;  // 126 and 127 come from the system's loader
+    // The second message comes from the Fortran runtime of some BLAS, which starts before main.
     if (outcome.code == 1) {
       EXPECT_THAT(outcome.err, AnyOf(HasSubstr("semblance: not enough memory"),
                                      HasSubstr("Cannot allocate memory")));
@@ -255,7 +255,7 @@ TEST_F(Trust, TooLittleMemoryToBeginWithIsSaidToo) {
   }
 }
 
-TEST_F(Trust, AStudyGoesOnWhenATrialRunsOutOfMemory) {
+TEST_F(Trust, AStudyContinuesAfterATrialRunsOutOfMemory) {
   if (!kMemoryHasLimits) {
     GTEST_SKIP();
   }
@@ -282,7 +282,7 @@ TEST_F(Trust, AFullStandardOutputIsAnError) {
 
 // ------------------------------------------------------------------ signals
 
-TEST_F(Trust, ASignalEndsALongRunWithinASecondAndLeavesNothing) {
+TEST_F(Trust, ASignalEndsALongRunWithinASecondWithoutFiles) {
   for (const int signal : {SIGINT, SIGTERM}) {
     const pid_t child = Start({"run", kPhantom, "--out", "out", "--quiet", "--threads", "1",
                                "--set", "implicit.resolution=300"});
@@ -290,26 +290,26 @@ TEST_F(Trust, ASignalEndsALongRunWithinASecondAndLeavesNothing) {
     std::this_thread::sleep_for(std::chrono::milliseconds(300));
     const Clock::time_point start = Clock::now();
     ::kill(child, signal);
-    EXPECT_EQ(CodeOf(child), 1);
+    EXPECT_EQ(ExitCode(child), 1);
     EXPECT_LT(SecondsSince(start), 1.5);
     EXPECT_FALSE(fs::exists(folder_ / "out"));
   }
 }
 
-// A pipe into which nobody writes: the reader does not come back.
-TEST_F(Trust, AReaderThatHangsIsEndedAfterASecondAndByASecondSignalAtOnce) {
+// Nobody writes into the pipe, so the reader never returns.
+TEST_F(Trust, AHangingReaderEndsAfterASecondOrAtASecondSignal) {
   ASSERT_EQ(::mkfifo((folder_ / "pipe.yaml").c_str(), 0600), 0);
   const auto start_reader = [&] {
     const pid_t child = Start({"check", "pipe.yaml"});
     WaitUntilCaught(child, SIGINT);
     WaitUntilCaught(child, SIGTERM);
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until it reads
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));  // until it waits for the pipe
     return child;
   };
   pid_t child = start_reader();
   Clock::time_point start = Clock::now();
   ::kill(child, SIGTERM);
-  EXPECT_EQ(CodeOf(child), 1);
+  EXPECT_EQ(ExitCode(child), 1);
   EXPECT_LT(SecondsSince(start), 1.5);
 
   child = start_reader();
@@ -317,11 +317,11 @@ TEST_F(Trust, AReaderThatHangsIsEndedAfterASecondAndByASecondSignalAtOnce) {
   ::kill(child, SIGINT);
   std::this_thread::sleep_for(std::chrono::milliseconds(50));
   ::kill(child, SIGTERM);
-  EXPECT_EQ(CodeOf(child), 1);
+  EXPECT_EQ(ExitCode(child), 1);
   EXPECT_LT(SecondsSince(start), 0.6);
 }
 
-// ------------------------------------------------------------------ what is wrong is said
+// ------------------------------------------------------------------ faults are reported
 
 TEST_F(Trust, NumbersOfTheCommandLineAreFinite) {
   for (const std::string number : {"nan", "inf", "-inf", "NAN"}) {
@@ -343,8 +343,8 @@ TEST_F(Trust, AShardIsTwoNumbersThatFit) {
   }
 }
 
-// Also what has no place in the file; check may look at many.
-TEST_F(Trust, ACacheThatCannotBeOneIsSaid) {
+// Faults without a place in the file name it too, because `check` may read many files.
+TEST_F(Trust, AnImpossibleCacheFolderIsReported) {
   Write("study.yaml",
         fmt::format("base: {}\njob: depth\ngrid: {{interp: [nearest, mean]}}\nmetric: "
                     "depth_truth.along_direction.rms_mm\n",
@@ -363,12 +363,14 @@ TEST_F(Trust, CheckNamesTheFileOfEachFault) {
   EXPECT_EQ(outcome.out, "fit.yaml: no fault found\n");
 }
 
-// Keys that experiments and fits both have: sound as one is sound, and what the other says is told.
-TEST_F(Trust, CheckTakesAFileForAFitThatIsNoExperiment) {
+// The keys belong to experiments and to fits. The file is sound as a fit; faults of the experiment
+// are printed as a warning.
+TEST_F(Trust, CheckAcceptsAFitThatIsNotAnExperiment) {
   Write("either.yaml", "fit: {plan: {type: adaptive, finest: 4}}\n");
   const Outcome outcome = Call("check either.yaml");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
-  EXPECT_THAT(outcome.out, HasSubstr("either.yaml: warning: it is one for `semblance fit`"));
+  EXPECT_THAT(outcome.out,
+              HasSubstr("either.yaml: warning: it is a configuration of `semblance fit`"));
   EXPECT_THAT(outcome.out, HasSubstr("level 4 is finer than the surface"));
 }
 
@@ -382,7 +384,7 @@ TEST_F(Trust, ALongMessageIsCut) {
   ExpectRefused("check " + kPhantom + " --set " + deep + "=1", "more than 64 steps");
 }
 
-TEST_F(Trust, AResultThatIsNoNumberIsNotUsableAndSaysWhy) {
+TEST_F(Trust, AResultThatIsNotANumberIsReportedAsNotUsable) {
   std::string csv = "x,y,z,weight\n";
   for (int k = 0; k < 100; ++k) {
     csv += fmt::format("{},{},{},1e308\n", k % 10, k / 10, (k * k) % 7);
@@ -415,7 +417,7 @@ TEST_F(Trust, MeshesThatCannotBeMeasuredAreRefused) {
 }
 
 // A volume whose voxels are ten times too large.
-TEST_F(Trust, ImportedMeshesAreThoseThatARunTakes) {
+TEST_F(Trust, ImportRefusesMeshesThatARunWouldRefuse) {
   const CtVolume volume = testing::CtPhantom{}.Make();
   Write("matrix.dat", {reinterpret_cast<const char*>(volume.values.data()),
                        volume.values.size() * sizeof(volume.values[0])});

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A head of nested balls as the slices of a CT: DICOM files (explicit little endian), with Python's standard library alone."""
+"""Writes a CT of a head of concentric balls as DICOM slices (explicit little endian), with Python's standard library."""
 import array
 import struct
 
@@ -20,7 +20,7 @@ def number(n):
 
 
 def head_at(x, y, z):
-    """Hounsfield units: skin of 80 mm, skull of 70 mm to 62 mm, around the middle."""
+    """Hounsfield units: skin of radius 80 mm, skull from 70 to 62 mm."""
     r = (x * x + y * y + z * z) ** 0.5
     edge = lambda radius: min(1.0, max(0.0, 0.5 - (r - radius) / 3))
     hu = -1000.0
@@ -30,7 +30,7 @@ def head_at(x, y, z):
 
 
 def write_slices(folder, count=40, size=64, spacing_mm=3.0, name="IM{:04d}"):
-    """The paths of the slices, bottom first; the head is cut 40 mm below its middle."""
+    """Writes the slices, bottom first, and returns their paths. The head is cut 40 mm below its centre."""
     ct = "1.2.840.10008.5.1.4.1.1.2"
     paths = []
     for k in range(count):

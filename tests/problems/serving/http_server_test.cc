@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a stranger may try at the workbench's address, by raw bytes over a socket of the test's own.
+// Attacks on the workbench's address, as raw bytes over a socket of the test.
 #include "problems/serving/http_server.h"
 
 #include <arpa/inet.h>
@@ -30,7 +30,7 @@ using ::testing::Not;
 using testing::ScratchFolder;
 using ::testing::StartsWith;
 
-// All that comes back on one connection; empty if none is taken.
+// The whole answer on one connection; empty if the connection is refused.
 std::string Ask(int port, const std::string& bytes, const char* address = "127.0.0.1") {
   const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
   sockaddr_in to{};
@@ -70,8 +70,8 @@ class WorkbenchServer : public ::testing::Test {
 
   static HttpServerOptions Listening() {
     HttpServerOptions options;
-    options.most_upload_bytes = 1 << 20;
-    options.most_bytes = 4096;
+    options.max_upload_bytes = 1 << 20;
+    options.max_body_bytes = 4096;
     return options;
   }
 
@@ -103,7 +103,7 @@ class WorkbenchServer : public ::testing::Test {
   std::jthread serving_;
 };
 
-TEST_F(WorkbenchServer, NothingIsCompressedForABrowserOnThisMachine) {
+TEST_F(WorkbenchServer, RepliesAreNotCompressed) {
   const std::string path = "/" + Token() + "/api/schema";
   const auto body = [](const std::string& answer) {
     return answer.substr(answer.find("\r\n\r\n"));
@@ -114,7 +114,7 @@ TEST_F(WorkbenchServer, NothingIsCompressedForABrowserOnThisMachine) {
   EXPECT_GT(answer.size(), 10000U);
 }
 
-TEST_F(WorkbenchServer, ThePageAndItsStateComeWithTheToken) {
+TEST_F(WorkbenchServer, ThePageAndItsStateNeedTheToken) {
   EXPECT_THAT(GetBelow(""), AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("<!DOCTYPE html>"),
                                   HasSubstr("Content-Security-Policy: default-src 'none'"),
                                   HasSubstr("Referrer-Policy: no-referrer")));
@@ -123,7 +123,7 @@ TEST_F(WorkbenchServer, ThePageAndItsStateComeWithTheToken) {
               AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("\"mine\"")));
 }
 
-TEST_F(WorkbenchServer, WithoutTheWholeTokenNothingComes) {
+TEST_F(WorkbenchServer, RequestsWithoutTheWholeTokenAreRefused) {
   std::string near = Token();
   near.back() = near.back() == '0' ? '1' : '0';
   for (const std::string& path : std::vector<std::string>{
@@ -134,7 +134,7 @@ TEST_F(WorkbenchServer, WithoutTheWholeTokenNothingComes) {
   }
 }
 
-TEST_F(WorkbenchServer, EachServerHasATokenOfItsOwn) {
+TEST_F(WorkbenchServer, EachServerHasItsOwnToken) {
   EXPECT_EQ(RandomToken().size(), 64u);
   EXPECT_NE(RandomToken(), RandomToken());
 }
@@ -153,7 +153,7 @@ TEST_F(WorkbenchServer, AnotherHostIsRefused) {
               StartsWith("HTTP/1.1 403"));
 }
 
-TEST_F(WorkbenchServer, AnotherOriginIsRefusedAndAPostWithoutOne) {
+TEST_F(WorkbenchServer, AnotherOriginAndAPostWithoutOriginAreRefused) {
   const std::string body = R"({"do": "set", "path": "title", "value": "theirs"})";
   for (const std::string& origin :
        {std::string(), std::string("Origin: null\r\n"), std::string("Origin: http://evil\r\n"),
@@ -166,7 +166,7 @@ TEST_F(WorkbenchServer, AnotherOriginIsRefusedAndAPostWithoutOne) {
   EXPECT_THAT(GetBelow("api/state"), Not(HasSubstr("theirs")));
 }
 
-TEST_F(WorkbenchServer, LargeBodiesAndOnesOfUnknownSizeAreRefusedUnread) {
+TEST_F(WorkbenchServer, LargeBodiesAndBodiesOfUnknownSizeAreRefusedUnread) {
   const std::string head = fmt::format(
       "POST /{}/api/act HTTP/1.1\r\nHost: {}\r\nConnection: close\r\n{}"
       "Content-Type: application/json\r\n",
@@ -197,7 +197,7 @@ TEST_F(WorkbenchServer, NoPathLeadsOutOfTheRun) {
   }
 }
 
-TEST_F(WorkbenchServer, GarbageIsAnsweredInWords) {
+TEST_F(WorkbenchServer, GarbageGetsAnErrorMessage) {
   for (const char* body :
        {"", "{", "[]", "null", "\"do\"", "{}", R"({"do": 3})", R"({"do": "nothing"})",
         R"({"do": "place"})", R"({"do": "open"})", R"({"do": "variants"})",
@@ -216,8 +216,8 @@ TEST_F(WorkbenchServer, GarbageIsAnsweredInWords) {
   EXPECT_THAT(GetBelow("api/state"), StartsWith("HTTP/1.1 200")) << "and it goes on";
 }
 
-// A browser lists a status of 400 and above in its console, as if the page had a fault.
-TEST_F(WorkbenchServer, WhatAPersonCannotHaveIsAnAnswerWithTheReason) {
+// A browser would list a status of 400 and above in its console as a fault of the page.
+TEST_F(WorkbenchServer, AnImpossibleActionGetsStatus200WithTheReason) {
   const auto refused = AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("{\"refused\":"),
                              Not(HasSubstr("Content-Disposition")));
   const std::string before = GetBelow("api/state");
@@ -240,7 +240,7 @@ TEST_F(WorkbenchServer, WhatAPersonCannotHaveIsAnAnswerWithTheReason) {
   EXPECT_EQ(GetBelow("api/state"), before);
 }
 
-TEST_F(WorkbenchServer, AnUploadKeepsItsNameToItself) {
+TEST_F(WorkbenchServer, AnUploadCannotEscapeItsBatch) {
   const auto upload = [this](const std::string& query) {
     return Post("api/upload?" + query, "not a mesh", OwnOrigin(), "", "application/octet-stream");
   };
@@ -256,7 +256,7 @@ TEST_F(WorkbenchServer, AnUploadKeepsItsNameToItself) {
   EXPECT_FALSE(std::filesystem::exists(folder_ / "bench/a.ply"));
   EXPECT_THAT(upload("batch=b&name=a.ply"),
               AllOf(StartsWith("HTTP/1.1 200"), HasSubstr("{\"path\":")));
-  EXPECT_THAT(GetBelow("api/state"), Not(HasSubstr("a.ply"))) << "what is sent is not opened yet";
+  EXPECT_THAT(GetBelow("api/state"), Not(HasSubstr("a.ply"))) << "an upload is not opened yet";
   EXPECT_THAT(Post("api/act", R"({"do": "forget", "batch": ".."})", OwnOrigin()),
               HasSubstr("{\"refused\":"));
   EXPECT_THAT(Post("api/act", R"({"do": "forget", "batch": "b"})", OwnOrigin()),
@@ -275,16 +275,16 @@ TEST_F(WorkbenchServer, ASecondWorkbenchOnTheFolderIsRefused) {
   }
 }
 
-TEST_F(WorkbenchServer, AStopAtAnyMomentOfItsStartEndsIt) {
+TEST_F(WorkbenchServer, AStopDuringTheStartEndsTheServer) {
   for (int k = 0; k < 40; ++k) {
     HttpServer server(bench_, Listening());
     const std::jthread serving([&](const std::stop_token& stop) { server.Serve(stop); });
     std::this_thread::sleep_for(std::chrono::microseconds(10 * k));
-  }  // each is stopped and awaited here
+  }  // each thread is stopped and joined here
 }
 
-TEST_F(WorkbenchServer, NoOtherAddressAnswers) {
-  // All of 127/8 is this machine; the server listens on one of them alone.
+TEST_F(WorkbenchServer, OnlyOneLoopbackAddressAnswers) {
+  // Every address of 127/8 is this machine. The server listens on only one of them.
   EXPECT_EQ(Ask(server_.Port(), "GET / HTTP/1.1\r\n\r\n", "127.0.0.2"), "");
 }
 

@@ -9,11 +9,11 @@ import time
 import urllib.error
 import urllib.request
 
-ELEMENT = "element-6066-11e4-a52e-4f735466cecf"  # the protocol's own name for a reference
+ELEMENT = "element-6066-11e4-a52e-4f735466cecf"  # key of an element reference in the protocol
 
 
 def missing():
-    """What is not installed, or an empty text."""
+    """Names of the missing programs, or an empty text."""
     return " and ".join(name for name in ("chromium", "chromedriver") if not shutil.which(name))
 
 
@@ -24,17 +24,17 @@ def free_port():
 
 
 class CannotStart(RuntimeError):
-    """The browser is installed, and does not run here: no shared memory, say, or no processes of its own."""
+    """The browser is installed but cannot run here, for example without shared memory."""
 
 
-# A page draws in software here: four samples a pixel take twice as long as one.
+# Without a graphics card four samples per pixel take twice as long as one.
 ROUGH = """{const get = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function(kind, options) {
   return get.call(this, kind, kind.startsWith('webgl') ? {...options, antialias: false} : options); };}"""
 
 
 class Browser:
-    """Headless Chromium with a window of width x height pixels; rough: its 3-D pictures have jagged edges."""
+    """Headless Chromium with a window of width x height pixels; rough: 3-D pictures without antialiasing."""
 
     def __init__(self, width, height, rough=False):
         port = free_port()
@@ -89,22 +89,22 @@ class Browser:
                     {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600})
 
     def darken(self):
-        """As for a person who likes it dark."""
+        """Switches the page to the dark colour scheme."""
         self._order("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": "dark"}]})
 
     def _order(self, command, parameters):
-        """One of Chromium's own, beyond the protocol."""
+        """Sends a command of Chromium that the protocol does not define."""
         self._call("POST", self.session + "/goog/cdp/execute", {"cmd": command, "params": parameters})
 
     def open(self, url):
         self._call("POST", self.session + "/url", {"url": url})
 
     def run(self, script, *arguments):
-        """The value of a piece of JavaScript with `return`; a promise is awaited."""
+        """Runs JavaScript and gives the value of its `return`; a promise is awaited."""
         return self._call("POST", self.session + "/execute/sync", {"script": script, "args": list(arguments)})
 
     def wait(self, script, *arguments, seconds=60):
-        """Until the script's value is true."""
+        """Waits until the script's value is true, and returns that value."""
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             value = self.run(script, *arguments)
@@ -114,7 +114,7 @@ class Browser:
         raise AssertionError(f"after {seconds} s still not: {script}")
 
     def pointer(self, *actions):
-        """Actions of the mouse in the protocol's own words."""
+        """Performs mouse actions in the format of the protocol."""
         self._call("POST", self.session + "/actions", {"actions": [
             {"type": "pointer", "id": "mouse", "parameters": {"pointerType": "mouse"}, "actions": list(actions)}]})
 
@@ -123,11 +123,11 @@ class Browser:
         return {"type": "pointerMove", "duration": milliseconds, "x": round(x), "y": round(y), "origin": "viewport"}
 
     def click_at(self, x, y):
-        """A press and a release of the left button at a point of the window."""
+        """Clicks the left button at a point of the window."""
         self.pointer(self.move(x, y), {"type": "pointerDown", "button": 0}, {"type": "pointerUp", "button": 0})
 
     def press_and_drag(self, start, end, steps=4):
-        """The left button stays pressed."""
+        """Drags with the left button and keeps it pressed."""
         self.pointer(self.move(*start), {"type": "pointerDown", "button": 0},
                      *[self.move(*[p + (q - p) * k / steps for p, q in zip(start, end)], 30) for k in range(1, steps + 1)])
 
@@ -135,16 +135,16 @@ class Browser:
         self.pointer({"type": "pointerUp", "button": 0})
 
     def choose_files(self, selector, *paths):
-        """As a person does in the window that a file input opens."""
+        """Chooses files for a file input."""
         found = self._call("POST", self.session + "/element", {"using": "css selector", "value": selector})
         self._call("POST", f"{self.session}/element/{found[ELEMENT]}/value", {"text": "\n".join(map(str, paths))})
 
     def settle(self):
-        """Until the page has drawn what was asked."""
+        """Waits until the page has drawn."""
         self.run("return new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(1))))")
 
     def click(self, selector):
-        """A click on the element of a CSS selector, scrolled into view."""
+        """Scrolls to the element of a CSS selector and clicks on it."""
         box = self.run("const e = document.querySelector(arguments[0]); if (!e) { return null; }"
                        "e.scrollIntoView({block: 'center'}); const b = e.getBoundingClientRect();"
                        "return [b.left + b.width / 2, b.top + b.height / 2];", selector)
@@ -152,7 +152,7 @@ class Browser:
         self.click_at(*box)
 
     def press(self, *keys):
-        """Keys one after the other; a tuple is pressed together."""
+        """Presses keys one after the other; the keys of a tuple are pressed together."""
         steps = []
         for key in keys:
             together = key if isinstance(key, tuple) else (key,)
@@ -165,6 +165,6 @@ class Browser:
             file.write(base64.b64decode(self._call("GET", self.session + "/screenshot")))
 
     def complaints(self):
-        """What the console said that a person would call an error."""
+        """The errors in the browser's console."""
         entries = self._call("POST", self.session + "/se/log", {"type": "browser"})
         return [entry["message"] for entry in entries if entry["level"] in ("SEVERE", "ERROR")]

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a person brings to the workbench's page: a path, files that are chosen, files that are dropped; a configuration,
-the slices of a CT, a mesh in metres, landmarks; with names that would be tags or break the page. Then variants of a head
-side by side, first coarse and then in full.
+"""Opening files in the workbench's page: by path, chosen, dropped; a configuration, the slices of a CT, a mesh in metres,
+landmarks; with names that contain tags or are very long. Then variants of a head side by side, first coarse, then full.
 
 usage: workbench_open_page.py PROGRAM CONFIG FOLDER [PICTURES]     exit code 77: skipped, as something is not installed
 """
@@ -25,9 +24,9 @@ def give_path(browser, path):
                 "field.dispatchEvent(new KeyboardEvent('keydown', {key: 'Enter'}))", str(path))
 
 
-def choose_way(browser, way):
-    browser.wait("return document.querySelector(arguments[0])", f'#opening [data-way="{way}"]')
-    browser.click(f'#opening [data-way="{way}"]')
+def choose_role(browser, role):
+    browser.wait("return document.querySelector(arguments[0])", f'#opening [data-way="{role}"]')
+    browser.click(f'#opening [data-way="{role}"]')
 
 
 def await_subject(browser, name):
@@ -36,7 +35,7 @@ def await_subject(browser, name):
 
 
 def drop(browser, files):
-    """{name: text}, dropped together on the view."""
+    """Drops files {name: text} together on the view."""
     browser.run("""const data = new DataTransfer();
         for (const [name, text] of Object.entries(arguments[0])) { data.items.add(new File([text], name)); }
         const event = (type) => new DragEvent(type, {dataTransfer: data, bubbles: true, cancelable: true});
@@ -45,17 +44,17 @@ def drop(browser, files):
 
 
 def refused(browser, give, words):
-    """One clear line; nothing has changed."""
+    """Expects a message with these words, and no change of the state."""
     revision = state(browser)["revision"]
     browser.run("document.getElementById('message').textContent = ''")
     give()
-    said = browser.wait(MESSAGE)
-    assert words in said, (words, said)
-    assert state(browser)["revision"] == revision, said
+    message = browser.wait(MESSAGE)
+    assert words in message, (words, message)
+    assert state(browser)["revision"] == revision, message
 
 
 def mesh_in_metres(path):
-    """A ball as wide as a head, in metres: OBJ."""
+    """Writes a box as wide as a head, in metres, as OBJ."""
     points = "".join(f"v {x} {y} {z}\n" for x in (-.08, .08) for y in (-.1, .1) for z in (-.1, .1))
     faces = ((1, 2, 4, 3), (5, 7, 8, 6), (1, 5, 6, 2), (3, 4, 8, 7), (1, 3, 7, 5), (2, 6, 8, 4))
     path.write_text(points + "".join(f"f {a} {b} {c}\nf {a} {c} {d}\n" for a, b, c, d in faces))
@@ -63,7 +62,7 @@ def mesh_in_metres(path):
 
 
 def open_from_nothing(browser, config):
-    """By a path; a mistake is one line; the opening is one step."""
+    """Opens the first head by its path. A wrong path gives one line. The opening is one step of the history."""
     refused(browser, lambda: give_path(browser, "/no/such/head.ply"), "/no/such/head.ply: no such file")
     give_path(browser, config)
     await_subject(browser, "phantom 1")
@@ -75,24 +74,24 @@ def open_from_nothing(browser, config):
 
 
 def open_slices(browser, folder, pictures):
-    """Several files chosen together: the other head is asked about, and comes with its skin."""
+    """Chooses several files together. The page asks before it replaces the head; the new head has its skin."""
     folder.mkdir()
     slices = dicom_slices.write_slices(folder)
     browser.click("[data-tab=skull]")
     browser.choose_files("#panel .chooser input[type=file]", *slices)
     browser.wait("return document.querySelector('#opening [data-way]')", seconds=100)
     take_picture(browser, pictures, "ask")
-    assert state(browser)["subject"]["name"] == "phantom 1", "replaced unasked"
-    choose_way(browser, "head")
+    assert state(browser)["subject"]["name"] == "phantom 1", "replaced without a question"
+    choose_role(browser, "head")
     browser.wait("const s = window.semblance.store.state; return s.job.name === 'open' && s.job.state !== 'running'")
     browser.wait(IDLE)
-    said = browser.run(MESSAGE)
-    if "ITK" in said:
-        print(f"no DICOM in this build: {said}")
+    message = browser.run(MESSAGE)
+    if "ITK" in message:
+        print(f"no DICOM in this build: {message}")
         browser.run("return window.semblance.opener.forget()")
         return
     now = state(browser)
-    assert now["subject"]["skin"] and 130 < now["subject"]["size_mm"][0] < 150, (said, now["subject"])
+    assert now["subject"]["skin"] and 130 < now["subject"]["size_mm"][0] < 150, (message, now["subject"])
     assert not now["landmarks"] and now["subject"]["name"] == "volume"
     browser.wait("const box = window.semblance.scene.main.stage.layers.get('skull').object.geometry.boundingBox;"
                  "return box && Math.abs(box.max.x - box.min.x - arguments[0]) < 2", now["subject"]["size_mm"][0])
@@ -103,12 +102,12 @@ def open_slices(browser, folder, pictures):
 
 
 def correct_unit(browser, mesh):
-    """What is shown says which unit the file has."""
+    """Corrects the unit with the button that the page offers."""
     give_path(browser, mesh)
-    choose_way(browser, "head")
+    choose_role(browser, "head")
     await_subject(browser, mesh.stem)
     assert state(browser)["subject"]["size_mm"][0] < 1
-    browser.run("[...document.querySelectorAll('#panel button')].find((b) => b.textContent === 'Take metres').click()")
+    browser.run("[...document.querySelectorAll('#panel button')].find((b) => b.textContent === 'Use metres').click()")
     browser.wait("return window.semblance.store.state.subject.size_mm[0] > 150")
     browser.run("const axes = [...document.querySelectorAll('#panel select')].find((s) => s.value === 'LPS');"
                 "axes.value = 'RAS'; axes.dispatchEvent(new Event('change'))")
@@ -116,7 +115,7 @@ def correct_unit(browser, mesh):
 
 
 def hostile_names(browser, pictures):
-    """Names that would be tags, or longer than any line, in subject, file, site, note and title."""
+    """Names that contain tags or are longer than any line, in subject, file, site, note and title."""
     scripts = browser.run("return document.scripts.length")
     text = f"subject: {quoted(HOSTILE)}\nlandmarks:\n  - {{site: g, point: [0, -80, 0], note: {quoted(HOSTILE)}}}\n"
     drop(browser, {f"{HOSTILE.replace('/', '_')}.yaml": text})
@@ -128,14 +127,14 @@ def hostile_names(browser, pictures):
     refused(browser, lambda: drop(browser, {"a\n\u0007b.docx": "x"}), "a__b.docx")
     refused(browser, lambda: drop(browser, {f"{LONG}.zip": "x"}), "unpack it")
     drop(browser, {"sites.yaml": f"landmarks:\n  - {{site: {quoted(HOSTILE)}, point: [0, 0, 0]}}\n"})
-    choose_way(browser, "landmarks")
+    choose_role(browser, "landmarks")
     assert "<script>" in browser.wait(MESSAGE)
     browser.run("return window.semblance.opener.forget()")
     drop(browser, {f"{LONG}.yaml": f"title: {quoted(HOSTILE + LONG)}\ntissue: {{depths: measured}}\n"})
-    choose_way(browser, "options")
+    choose_role(browser, "options")
     browser.wait("return window.semblance.store.state.values.title.startsWith('<script>')")
     drop(browser, {"long.yaml": f"subject: {LONG}\nlandmarks:\n  - {{site: g, point: [0, -80, 0]}}\n"})
-    choose_way(browser, "landmarks")
+    choose_role(browser, "landmarks")
     await_subject(browser, LONG)
     for width, height in ((1000, 640), (400, 800)):
         browser.resize(width, height)
@@ -155,7 +154,7 @@ def quoted(text):
 
 
 def expect_kept(browser, button, name, begin):
-    """What the browser would keep after a click on a button of the panel; it is stopped short of doing so."""
+    """Checks the file that a button of the panel would save. The browser does not save it."""
     browser.run("URL.createObjectURL = (blob) => { window.kept = blob; return 'blob:'; };"
                 "HTMLAnchorElement.prototype.click = function () { window.keptAs = this.download; };"
                 "[...document.querySelectorAll('#panel button')].find((b) => b.textContent === arguments[0]).click()", button)
@@ -165,9 +164,9 @@ def expect_kept(browser, button, name, begin):
 
 
 def compare_variants(browser, config, pictures):
-    """A standard deviation less and more: coarse at once, then in full; under one camera, with their differences."""
+    """Minus and plus one standard deviation: coarse at once, then full; under one camera, with their differences."""
     give_path(browser, config)
-    choose_way(browser, "head")
+    choose_role(browser, "head")
     await_subject(browser, "phantom 1")
     browser.click("[data-tab=compare]")
     browser.click("[data-set=deviations]")
@@ -182,7 +181,7 @@ def compare_variants(browser, config, pictures):
     means = browser.run("const mean = ({stage}) => { const v = stage.layers.get('face').object.userData.values;"
                         "return v ? v.reduce((sum, x) => sum + x, 0) / v.length : 0; };"
                         "return window.semblance.scene.others.map(mean)")
-    assert means[1] == 0 and means[0] + 2 < means[2], means  # so coarse a face is not even in it
+    assert means[1] == 0 and means[0] + 2 < means[2], means
     assert browser.run("const [first, ...rest] = window.semblance.scene.others;"
                        "return rest.every(({stage}) => stage.shared.camera === first.stage.shared.camera)")
     take_picture(browser, pictures, "compare-full")
@@ -206,8 +205,8 @@ def work(browser, program, config, folder, pictures):
         compare_variants(browser, config, pictures)
         complaints = browser.complaints()
         assert not complaints, complaints
-        assert not list((folder / "incoming").glob("*")), "what was opened or left is forgotten"
-        # All of it is there after a crash.
+        assert not list((folder / "incoming").glob("*")), "opened and cancelled uploads are deleted"
+        # The work survives a crash.
         subject = state(browser)["subject"]["name"]
         bench.kill()
         bench = Workbench(program, [str(folder)])

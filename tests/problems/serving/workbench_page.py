@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The workbench end to end: landmarks by clicks on a phantom's skull, a depth changed, the face seen to move, the full
-face, a point of it pulled by a drag and by keys, a crash; then the folder is run from the command line, and the bytes
-are the same. What is opened and compared is in workbench_open_page.py.
+"""The workbench end to end: landmarks placed by clicks on a phantom's skull, a changed depth that moves the face, the full
+face, pulls by a drag and by keys, a crash. A run of the folder from the command line must give the same bytes.
+workbench_open_page.py tests opening files and comparing variants.
 
 usage: workbench_page.py PROGRAM CONFIG FOLDER [PICTURES]     exit code 77: skipped, as something is not installed
 """
@@ -16,7 +16,7 @@ import webdriver
 SKIPPED = 77
 UNDO = ("\ue009", "z")  # Control
 
-# Where a point of the head lies in the window: the page's own camera, asked through its canvas.
+# Position in the window of a point of the head, by the page's camera.
 PLACE = """
 const [x, y, z] = arguments, canvas = document.querySelector('#view canvas'), box = canvas.getBoundingClientRect();
 const at = new THREE.Vector3(x, y, z).project(window.semblance.scene.shared.camera.camera);
@@ -27,27 +27,27 @@ FACE = "return window.semblance.faces.kind;"
 STATE = "return window.semblance.store.state;"
 TURN = "return window.semblance.scene.shared.camera.turn;"
 
-# The view's ground, and that of the page's style.
+# Background colours of the view and of the page's style.
 GROUND = """const {renderer, canvas} = window.semblance.scene.main.stage;
 return [renderer.getClearColor().getHex(), new THREE.Color(getComputedStyle(canvas).backgroundColor).getHex()];"""
 
 IS_FULL = "const {pace, shared} = window.semblance.scene; return !shared.camera || pace.isFull;"
 
-# From now on, of each picture: at which share of the full resolution it was drawn.
+# Records for each later picture the share of the full resolution at which it is drawn.
 WATCH_SHARES = """
 const {stage} = window.semblance.scene.main, draw = stage.draw;
 window.shares = [];
 stage.draw = function(share = 1) { window.shares.push(share); draw.call(this, share); };
 """
 
-# As if the last full picture had taken so many milliseconds, just now; then the head turns.
+# Pretends that the last full picture has just taken so many milliseconds, then turns the head.
 TURN_AFTER = """
 const {pace, shared: {camera}} = window.semblance.scene;
 [pace.full_ms, pace.timed_at, window.shares] = [arguments[0], performance.now(), []];
 camera.rotate(5, 0);
 """
 
-# What a picture is that a person saves just now, and what lies in the middle of the view.
+# The picture that a person would save now, and the point in the middle of the view.
 SAVED_AND_HIT = """
 const {scene} = window.semblance, {stage, canvas} = scene.main, box = canvas.getBoundingClientRect();
 let saved = null;
@@ -60,7 +60,7 @@ HTMLAnchorElement.prototype.click = press;
 return [saved, hit && hit.point.toArray()];
 """
 
-# The worst relative error of distances along a plane, where they are straight, over pairs of triangles.
+# The largest relative error of distances along a plane, where they are straight lines, over pairs of triangles.
 PLANE = """
 const plane = new THREE.PlaneBufferGeometry(2, 2, 24, 24), count = plane.index.count / 3;
 const middle = (t) => [0, 1, 2].reduce((sum, k) => sum.add(new THREE.Vector3().fromArray(
@@ -116,7 +116,7 @@ def take_away(browser, sites):
 
 
 def place_by_clicks(browser, points):
-    """Each site is chosen in the list, the head is turned to it, and the bone is clicked."""
+    """For each site: chooses it in the list, turns the head to it, and clicks on the bone."""
     for site, point in points.items():
         turn = {"_l": 75, "_r": -75}.get(site[-2:], 0)
         browser.run("window.semblance.scene.shared.camera.look(arguments[0], 5)", turn)
@@ -129,7 +129,7 @@ def place_by_clicks(browser, points):
 
 
 def expect_site_picture(browser, site):
-    """Where the site lies stands beside what it is, and both are in the window."""
+    """Expects the picture of the site beside its definition, both inside the window."""
     browser.run("document.querySelector(arguments[0]).click()", f'[data-site="{site}"]')
     browser.wait("const image = document.querySelector('.site-place img');"
                  "return image && image.src.endsWith(arguments[0]) && image.complete && image.naturalWidth === 440", site)
@@ -173,12 +173,12 @@ def undo_words(browser):
 
 
 def await_step(browser, former):
-    """A new step, and the face that belongs to it."""
+    """Waits for a new step and for its face."""
     browser.wait("return window.semblance.store.state.steps.undo !== arguments[0] && !window.semblance.faces.busy", former)
 
 
 def pull_the_cheek(browser):
-    """The face follows the pointer; Escape takes it back; a release makes it, as it was shown."""
+    """The face follows the pointer; Escape cancels the pull; a release makes it as it was shown."""
     browser.click("[data-tab=sculpt]")
     browser.run("window.semblance.scene.shared.camera.look(30, 0)")
     start = browser.run("const b = document.querySelector('#view canvas').getBoundingClientRect();"
@@ -197,13 +197,13 @@ def pull_the_cheek(browser):
     shown, former = browser.run(POSITIONS), undo_words(browser)
     browser.release()
     await_step(browser, former)
-    assert most_moved(shown, browser.run(POSITIONS)) < 0.05, "what was shown is not what came"
+    assert most_moved(shown, browser.run(POSITIONS)) < 0.05, "the preview differs from the result"
     assert browser.run(TURN) == turn, "the head turned while the face was pulled"
     assert "pulled level 2" in undo_words(browser)
 
 
 def pull_by_keys(browser):
-    """In the middle of the view, in its plane; undone and done again."""
+    """Pulls the point in the middle of the view in the plane of the view; then undo and redo."""
     browser.run("window.semblance.scene.shared.camera.look(0, 0); document.querySelector('#view canvas').focus()")
     before, former = browser.run(POSITIONS), undo_words(browser)
     browser.press("h", "w")
@@ -219,13 +219,13 @@ def pull_by_keys(browser):
 
 
 def run_again(program, folder):
-    """The folder's configuration from the command line, beside what follows."""
+    """Starts a run of the folder's configuration from the command line, in parallel to the rest of the test."""
     return subprocess.Popen([program, "run", os.path.join(folder, "config.yaml"), "--out",
                              os.path.join(os.path.dirname(folder), "again"), "--quiet"], stdout=subprocess.DEVNULL)
 
 
 def expect_same_files(folder):
-    """Every file of the folder's run but the times, against those of the command line."""
+    """Compares every file of the folder's run, except the times, with the run of the command line."""
     again, compared = os.path.join(os.path.dirname(folder), "again"), 0
     for root, _, names in os.walk(again):
         for name in names:
@@ -239,7 +239,7 @@ def expect_same_files(folder):
 
 
 def take_picture(browser, folder, name):
-    """Twice, for the first may be of the frame before."""
+    """Takes the picture twice, because the first may show the previous frame."""
     if folder:
         browser.run("window.semblance.scene.draw()")
         browser.wait(IS_FULL)
@@ -249,8 +249,8 @@ def take_picture(browser, folder, name):
 
 
 def expect_coarse_pictures_while_it_moves(browser):
-    """Where a full picture takes long: a coarser one at once, the full one at rest, or once the face that is on its way has come.
-    A picture that is saved is full, and what lies under the pointer the same."""
+    """If a full picture takes long: a coarser one at once, the full one at rest, or once a requested face has arrived.
+    A saved picture is full, and the point under the pointer is the same for both."""
     browser.run(WATCH_SHARES)
     browser.run("window.semblance.faces.busy = true")
     browser.run(TURN_AFTER, 400)
@@ -268,9 +268,9 @@ def expect_coarse_pictures_while_it_moves(browser):
 
 
 def take_skin_away(browser):
-    """With it a run would be scored, which takes time and proves nothing here."""
+    """Removes the skin, because scoring a run takes time and proves nothing here."""
     browser.click("[data-tab=skull]")
-    browser.run("[...document.querySelectorAll('#panel button')].find((b) => b.textContent === 'Without the skin').click()")
+    browser.run("[...document.querySelectorAll('#panel button')].find((b) => b.textContent === 'Remove the skin').click()")
     browser.wait("return !window.semblance.store.state.subject.skin")
 
 
@@ -307,10 +307,10 @@ def work(browser, program, config, folder, pictures):
         make_full_face(browser)
         vertices = state(browser)["edited_vertices"]
 
-        # A crash of the program, and another one that goes on.
+        # The program crashes, and another one continues.
         bench.kill()
         bench = Workbench(program, [folder])
-        browser.complaints()  # the page has asked a dead program
+        browser.complaints()  # the page requested from an ended program
         browser.darken()
         browser.open(bench.url)
         browser.wait("return window.semblance && window.semblance.faces.kind === 'full'")
@@ -333,7 +333,7 @@ def work(browser, program, config, folder, pictures):
         browser.click_at(*browser.run(PLACE, *points["g"]))
         text = browser.wait("const l = document.querySelectorAll('.view3d-label'); return l.length === 2 && l[1].textContent")
         found = re.search(r"depth: face ([\d.]+) mm", text)
-        assert found and 1 < float(found[1]) < 15, text  # through glass
+        assert found and 1 < float(found[1]) < 15, text  # measured through the transparent face
         picture("measure")
         expect_coarse_pictures_while_it_moves(browser)
         assert browser.run(PLANE) < 0.03
@@ -361,7 +361,7 @@ def work(browser, program, config, folder, pictures):
 
 
 def expect_reports_on_a_phone(browser, program, url, folder):
-    """The report of the run, and that of a fit: what stands open and what is folded, and nothing to scroll sideways."""
+    """The reports of the run and of a fit: which headings are open, and no sideways scrolling."""
     points = os.path.join(os.path.dirname(__file__), "..", "..", "..", "configs", "fit", "points.csv")
     fit = os.path.abspath(os.path.join(os.path.dirname(folder), "fit"))
     subprocess.run([program, "fit", points, "--out", fit, "--quiet"], check=True, stdout=subprocess.DEVNULL)
@@ -376,13 +376,13 @@ def expect_reports_on_a_phone(browser, program, url, folder):
 
 
 def run_in_browser(folders, pictures, work_in):
-    """The test's exit code: work_in(browser) in a new browser, or why there is none."""
+    """Runs work_in(browser) in a new browser and returns the test's exit code."""
     if words := webdriver.missing():
         print(f"skipped: {words} is not installed")
         return SKIPPED
     subprocess.run(["rm", "-rf", *folders], check=True)
     try:
-        # A small window is drawn sooner: all is drawn without a graphics card.
+        # A small window is drawn faster without a graphics card.
         browser = webdriver.Browser(1440, 900) if pictures else webdriver.Browser(1000, 560, rough=True)
     except webdriver.CannotStart as error:
         print(f"skipped: Chromium does not start here: {error}")

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a person brings to a workbench that is at work: what it is, what becomes of it, and that
-// each opening is one step that can be undone.
+// Opening files in a running workbench: the kind of each file, the resulting state, and that each
+// opening is one step that can be undone.
 #include "problems/workbench/bench_open.h"
 
 #include <fmt/format.h>
@@ -15,7 +15,6 @@
 #include "problems/subject/phantom.h"
 #include "problems/workbench/bench.h"
 #include "problems/workbench/bench_actions.h"
-#include "problems/workbench/bench_incoming.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -61,131 +60,137 @@ class WorkbenchOpening : public ::testing::Test {
     return options;
   }
 
-  // As the page would; the words of the end.
+  // Opens the file as the page does and returns the status of the ended job.
   static JobStatus Open(Bench& bench, const fs::path& path, OpenAs as) {
     OpenRequest request;
     request.path = path;
     request.as = as;
     bench.StartOpening(request);
-    while (bench.Look().job.state == JobState::kRunning) {
+    while (bench.TakeSnapshot().job.state == JobState::kRunning) {
       std::this_thread::sleep_for(std::chrono::milliseconds(2));
     }
-    return bench.Look().job;
+    return bench.TakeSnapshot().job;
   }
 
-  static std::string WhyNot(const fs::path& path) {
+  static std::string OpeningFault(const fs::path& path) {
     try {
-      LookAtBrought(path);
-      return "taken";
+      IdentifyImport(path);
+      return "no fault";
     } catch (const Error& error) {
       return error.what();
     }
   }
 
-  static const BenchState& StateOf(const Bench::Snapshot& shot) { return Now(shot.history); }
+  static const BenchState& StateIn(const Bench::Snapshot& shot) {
+    return CurrentState(shot.history);
+  }
 
   ScratchFolder folder_;
   Phantom phantom_;
   fs::path skull_, config_, landmarks_;
 };
 
-TEST_F(WorkbenchOpening, AFileIsKnownByItsNameAndItsKeys) {
-  EXPECT_EQ(LookAtBrought(skull_).kind, BroughtKind::kMesh);
-  EXPECT_EQ(LookAtBrought(Write("HEAD.STL", "")).kind, BroughtKind::kMesh);
-  EXPECT_EQ(LookAtBrought(Write("ct.nii.gz", "")).kind, BroughtKind::kVolume);
-  EXPECT_EQ(LookAtBrought(Write("points.fcsv", "")).kind, BroughtKind::kLandmarks);
-  EXPECT_EQ(LookAtBrought(landmarks_).kind, BroughtKind::kLandmarks);
-  EXPECT_EQ(LookAtBrought(config_).kind, BroughtKind::kConfig);
+TEST_F(WorkbenchOpening, TheKindOfAFileFollowsFromItsNameAndItsKeys) {
+  EXPECT_EQ(IdentifyImport(skull_).kind, ImportKind::kMesh);
+  EXPECT_EQ(IdentifyImport(Write("HEAD.STL", "")).kind, ImportKind::kMesh);
+  EXPECT_EQ(IdentifyImport(Write("ct.nii.gz", "")).kind, ImportKind::kVolume);
+  EXPECT_EQ(IdentifyImport(Write("points.fcsv", "")).kind, ImportKind::kLandmarks);
+  EXPECT_EQ(IdentifyImport(landmarks_).kind, ImportKind::kLandmarks);
+  EXPECT_EQ(IdentifyImport(config_).kind, ImportKind::kConfig);
 }
 
-TEST_F(WorkbenchOpening, AFolderIsTheOneThingInItOrAVolume) {
+TEST_F(WorkbenchOpening, AFolderCountsAsItsOnlyFileOrAsAVolume) {
   Write("both/a.ply", "");
   Write("both/head.yaml", "title: a head\nsubject: {type: files, skull: a.ply}\n");
-  EXPECT_EQ(LookAtBrought(folder_ / "both").path, folder_ / "both/head.yaml");
+  EXPECT_EQ(IdentifyImport(folder_ / "both").path, folder_ / "both/head.yaml");
   Write("raw/ct.mhd", "");
   Write("raw/ct.raw", "");
-  EXPECT_EQ(LookAtBrought(folder_ / "raw").path, folder_ / "raw/ct.mhd");
+  EXPECT_EQ(IdentifyImport(folder_ / "raw").path, folder_ / "raw/ct.mhd");
   Write("slices/IM0001", "");
   Write("slices/IM0002", "");
-  EXPECT_EQ(LookAtBrought(folder_ / "slices").kind, BroughtKind::kVolume);
-  EXPECT_EQ(LookAtBrought(folder_ / "slices").path, folder_ / "slices");
+  EXPECT_EQ(IdentifyImport(folder_ / "slices").kind, ImportKind::kVolume);
+  EXPECT_EQ(IdentifyImport(folder_ / "slices").path, folder_ / "slices");
 }
 
-TEST_F(WorkbenchOpening, WhatCannotBeOpenedIsSaidWithWhatCan) {
-  EXPECT_THAT(WhyNot(folder_ / "none.ply"), HasSubstr("no such file"));
-  EXPECT_THAT(WhyNot(Write("a.zip", "")), HasSubstr("unpack it"));
-  EXPECT_THAT(WhyNot(Write("a.docx", "")), HasSubstr("what can be opened: a mesh"));
-  EXPECT_THAT(WhyNot(Write("a.dcm", std::string(128, '\0') + "DICM")), HasSubstr("one slice"));
-  EXPECT_THAT(WhyNot(Write("study.yaml", "base: phantom.yaml\ngrid: {interp: [mean]}\n")),
+TEST_F(WorkbenchOpening, TheMessageForAnUnknownFileListsWhatCanBeOpened) {
+  EXPECT_THAT(OpeningFault(folder_ / "none.ply"), HasSubstr("no such file"));
+  EXPECT_THAT(OpeningFault(Write("a.zip", "")), HasSubstr("unpack it"));
+  EXPECT_THAT(OpeningFault(Write("a.docx", "")), HasSubstr("these can be opened: a mesh"));
+  EXPECT_THAT(OpeningFault(Write("a.dcm", std::string(128, '\0') + "DICM")),
+              HasSubstr("one slice"));
+  EXPECT_THAT(OpeningFault(Write("study.yaml", "base: phantom.yaml\ngrid: {interp: [mean]}\n")),
               HasSubstr("semblance study"));
-  EXPECT_THAT(WhyNot(fs::path(SEMBLANCE_SOURCE_DIR) / "configs/tables/rhine_caucasoid.yaml"),
+  EXPECT_THAT(OpeningFault(fs::path(SEMBLANCE_SOURCE_DIR) / "configs/tables/rhine_caucasoid.yaml"),
               HasSubstr("tissue.table"));
-  EXPECT_THAT(WhyNot(Write("other.yaml", "colour: red\n")), HasSubstr("no key at its top"));
-  EXPECT_THAT(WhyNot(Write("broken.yaml", "a: [1\n")), HasSubstr("broken.yaml:"));
+  EXPECT_THAT(OpeningFault(Write("other.yaml", "colour: red\n")),
+              HasSubstr("none of its top-level keys"));
+  EXPECT_THAT(OpeningFault(Write("broken.yaml", "a: [1\n")), HasSubstr("broken.yaml:"));
   Write("two/a.ply", "");
   Write("two/b.ply", "");
-  EXPECT_THAT(WhyNot(folder_ / "two"), HasSubstr("2 files that are opened one by one: a.ply"));
+  EXPECT_THAT(OpeningFault(folder_ / "two"),
+              HasSubstr("2 files that cannot be opened together: a.ply"));
   const Bench bench(Options());
-  EXPECT_THAT(WhyNot(bench.Folder()), HasSubstr("semblance workbench"));
+  EXPECT_THAT(OpeningFault(bench.Folder()), HasSubstr("semblance workbench"));
 }
 
-TEST_F(WorkbenchOpening, FromNothingToAHeadIsOneStepThatCanBeUndone) {
+TEST_F(WorkbenchOpening, OpeningAFirstHeadIsOneStepThatCanBeUndone) {
   Bench bench(Options());
   ASSERT_EQ(Open(bench, skull_, OpenAs::kHead).state, JobState::kFinished);
-  EXPECT_EQ(bench.Look().subject->skull.mesh.triangles.size(), phantom_.skull.triangles.size());
-  EXPECT_EQ(bench.Look().history.now, 1);
+  EXPECT_EQ(bench.TakeSnapshot().subject->skull.mesh.triangles.size(),
+            phantom_.skull.triangles.size());
+  EXPECT_EQ(bench.TakeSnapshot().history.now, 1);
   bench.Undo();
-  EXPECT_FALSE(bench.Look().subject->bone);
+  EXPECT_FALSE(bench.TakeSnapshot().subject->bone);
   bench.Redo();
-  EXPECT_TRUE(bench.Look().subject->bone);
+  EXPECT_TRUE(bench.TakeSnapshot().subject->bone);
 }
 
-TEST_F(WorkbenchOpening, AnotherHeadKeepsTheOptionsAndNothingOfTheFormerHead) {
+TEST_F(WorkbenchOpening, AnotherHeadKeepsTheOptionsButNoLandmarksOrEdits) {
   Bench bench(Options(config_));
-  bench.Do("build", [](BenchState s) { return ChangeSetting(s, "tissue.build", "\"obese\""); });
-  bench.Do("axes", [](BenchState s) { return ChangeSetting(s, "subject.axes", "\"RAS\""); });
-  bench.Do("depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.n", "7"); });
+  bench.Apply("build", [](BenchState s) { return ChangeSetting(s, "tissue.build", "\"obese\""); });
+  bench.Apply("axes", [](BenchState s) { return ChangeSetting(s, "subject.axes", "\"RAS\""); });
+  bench.Apply("depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.n", "7"); });
   ASSERT_EQ(Open(bench, skull_, OpenAs::kHead).state, JobState::kFinished);
-  const Bench::Snapshot shot = bench.Look();
+  const Bench::Snapshot shot = bench.TakeSnapshot();
   const auto& files = std::get<FileSubject>(shot.experiment.subject);
   EXPECT_EQ(files.skull, skull_);
   EXPECT_EQ(files.axes, Axes::kLps);
   EXPECT_TRUE(files.skin.empty());
   EXPECT_EQ(shot.experiment.tissue.build, Build::kObese);
   EXPECT_FALSE(shot.experiment.tissue.set_mm.contains("n"));
-  EXPECT_THAT(StateOf(shot).landmarks, IsEmpty());
-  EXPECT_EQ(StateOf(shot).subject, "skull");
+  EXPECT_THAT(StateIn(shot).landmarks, IsEmpty());
+  EXPECT_EQ(StateIn(shot).subject, "skull");
   bench.Undo();
-  EXPECT_THAT(StateOf(bench.Look()).landmarks, SizeIs(32));
-  EXPECT_EQ(std::get<FileSubject>(bench.Look().experiment.subject).axes, Axes::kRas);
+  EXPECT_THAT(StateIn(bench.TakeSnapshot()).landmarks, SizeIs(32));
+  EXPECT_EQ(std::get<FileSubject>(bench.TakeSnapshot().experiment.subject).axes, Axes::kRas);
 }
 
-TEST_F(WorkbenchOpening, AConfigurationComesWithItsHeadAndItsOptionsAndIsThereAfterACrash) {
+TEST_F(WorkbenchOpening, AConfigurationWithItsHeadAndOptionsSurvivesACrash) {
   {
     Bench bench(Options(skull_));
     ASSERT_EQ(Open(bench, config_, OpenAs::kHead).state, JobState::kFinished);
-    EXPECT_EQ(bench.Look().experiment.tissue.set_mm.at("g"), 9);
-    EXPECT_THAT(StateOf(bench.Look()).landmarks, SizeIs(32));
-    EXPECT_EQ(StateOf(bench.Look()).start, "start-2.yaml");
+    EXPECT_EQ(bench.TakeSnapshot().experiment.tissue.set_mm.at("g"), 9);
+    EXPECT_THAT(StateIn(bench.TakeSnapshot()).landmarks, SizeIs(32));
+    EXPECT_EQ(StateIn(bench.TakeSnapshot()).start, "start-2.yaml");
     bench.Undo();
-    EXPECT_FALSE(bench.Look().experiment.tissue.set_mm.contains("g"));
+    EXPECT_FALSE(bench.TakeSnapshot().experiment.tissue.set_mm.contains("g"));
     bench.Redo();
   }
   Bench again(Options());
-  EXPECT_EQ(again.Look().experiment.tissue.set_mm.at("g"), 9);
-  EXPECT_TRUE(again.Look().subject->skin.has_value());
+  EXPECT_EQ(again.TakeSnapshot().experiment.tissue.set_mm.at("g"), 9);
+  EXPECT_TRUE(again.TakeSnapshot().subject->skin.has_value());
 }
 
-TEST_F(WorkbenchOpening, OptionsAloneLeaveTheHead) {
+TEST_F(WorkbenchOpening, OpeningOptionsKeepsTheHead) {
   Bench bench(Options(skull_));
   bench.PlaceByRay("g", {0, -500, 0}, {0, 1, 0}, {0, 0, 0});
   ASSERT_EQ(Open(bench, config_, OpenAs::kOptions).state, JobState::kFinished);
-  EXPECT_EQ(std::get<FileSubject>(bench.Look().experiment.subject).skull, skull_);
-  EXPECT_EQ(bench.Look().experiment.tissue.set_mm.at("g"), 9);
-  EXPECT_THAT(StateOf(bench.Look()).landmarks, SizeIs(1));
+  EXPECT_EQ(std::get<FileSubject>(bench.TakeSnapshot().experiment.subject).skull, skull_);
+  EXPECT_EQ(bench.TakeSnapshot().experiment.tissue.set_mm.at("g"), 9);
+  EXPECT_THAT(StateIn(bench.TakeSnapshot()).landmarks, SizeIs(1));
 }
 
-TEST_F(WorkbenchOpening, WhatFailsLeavesAllAsItWas) {
+TEST_F(WorkbenchOpening, AFailedOpeningChangesNothing) {
   Bench bench(Options(config_));
   const auto files = [&bench] {
     std::vector<std::string> names;
@@ -214,31 +219,33 @@ TEST_F(WorkbenchOpening, WhatFailsLeavesAllAsItWas) {
   EXPECT_EQ(ReadFileBytes(bench.Folder() / "workbench.yaml"), history);
 }
 
-TEST_F(WorkbenchOpening, WhatTheBrowserSentIsKeptOnceItIsOpened) {
+TEST_F(WorkbenchOpening, AnUploadMovesToTheSubjectFolderWhenOpened) {
   Bench bench(Options());
   const std::string mesh = EncodeMesh(phantom_.skull, ".ply");
   SaveIncoming(bench.Folder(), "b1", "head of \"x\" <b>.ply", mesh);
   const fs::path sent = IncomingBatch(bench.Folder(), "b1");
-  ASSERT_EQ(Open(bench, sent, OpenAs::kHead).state, JobState::kFinished) << bench.Look().job.words;
+  ASSERT_EQ(Open(bench, sent, OpenAs::kHead).state, JobState::kFinished)
+      << bench.TakeSnapshot().job.words;
   EXPECT_FALSE(fs::exists(sent));
   const fs::path kept = bench.Folder() / "subject" / "head of \"x\" <b>.ply";
   EXPECT_EQ(ReadFileBytes(kept), mesh);
   SaveIncoming(bench.Folder(), "b2", "head of \"x\" <b>.ply", mesh);
   ASSERT_EQ(Open(bench, IncomingBatch(bench.Folder(), "b2"), OpenAs::kHead).state,
             JobState::kFinished);
-  EXPECT_NE(std::get<FileSubject>(bench.Look().experiment.subject).skull, kept) << "none replaced";
+  EXPECT_NE(std::get<FileSubject>(bench.TakeSnapshot().experiment.subject).skull, kept)
+      << "no file is replaced";
 }
 
-TEST_F(WorkbenchOpening, AConfigurationIsSentWithTheFilesThatItNames) {
+TEST_F(WorkbenchOpening, AConfigurationIsUploadedWithTheFilesThatItNames) {
   Bench bench(Options());
   const std::string config = "subject: {type: files, skull: meshes/skull.ply}\n";
   SaveIncoming(bench.Folder(), "b1", "head/head.yaml", config);
   const JobStatus alone = Open(bench, IncomingBatch(bench.Folder(), "b1"), OpenAs::kHead);
-  EXPECT_THAT(alone.words, HasSubstr("Bring the files that it names"));
+  EXPECT_THAT(alone.words, HasSubstr("Upload the files that it names"));
   SaveIncoming(bench.Folder(), "b1", "head/meshes/skull.ply", EncodeMesh(phantom_.skull, ".ply"));
   const JobStatus both = Open(bench, IncomingBatch(bench.Folder(), "b1"), OpenAs::kHead);
   ASSERT_EQ(both.state, JobState::kFinished) << both.words;
-  EXPECT_TRUE(bench.Look().subject->bone);
+  EXPECT_TRUE(bench.TakeSnapshot().subject->bone);
 }
 
 TEST_F(WorkbenchOpening, NoNameLeadsOutOfTheFolder) {
@@ -254,12 +261,12 @@ TEST_F(WorkbenchOpening, NoNameLeadsOutOfTheFolder) {
   EXPECT_THROW(IncomingBatch(folder_.Path(), ""), InputError);
 }
 
-TEST_F(WorkbenchOpening, LandmarksOnTheBoneGoAlongWhenItsFrameIsCorrected) {
+TEST_F(WorkbenchOpening, LandmarksOnTheBoneMoveWithItsFrame) {
   Bench bench(Options(skull_));
   bench.PlaceByRay("g", {0, -500, 0}, {0, 1, 0}, {0, 0, 0});
-  bench.Do("placed", [](BenchState s) { return PlaceLandmark(s, "n", {0, -300, 0}); });
+  bench.Apply("placed", [](BenchState s) { return PlaceLandmark(s, "n", {0, -300, 0}); });
   const auto point = [&bench](std::size_t k) {
-    return StateOf(bench.Look()).landmarks.at(k).point;
+    return StateIn(bench.TakeSnapshot()).landmarks.at(k).point;
   };
   const auto before = point(0);
   bench.CorrectFrame("subject.axes", "\"RAS\"");
@@ -267,7 +274,7 @@ TEST_F(WorkbenchOpening, LandmarksOnTheBoneGoAlongWhenItsFrameIsCorrected) {
   EXPECT_EQ(point(1)[1], -300) << "off the bone: its file may have had the right frame";
   bench.CorrectFrame("subject.units", "\"cm\"");
   EXPECT_NEAR(point(0)[1], -10 * before[1], 1e-9);
-  EXPECT_LT(bench.Look().checks.sites.at("g").from_bone_mm, 1e-6);
+  EXPECT_LT(bench.TakeSnapshot().checks.sites.at("g").from_bone_mm, 1e-6);
   bench.Undo();
   bench.Undo();
   EXPECT_EQ(point(0), before);

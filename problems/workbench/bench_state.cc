@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/workbench/bench_history.h"
+#include "problems/workbench/bench_state.h"
 
 #include <algorithm>
 #include <array>
@@ -17,18 +17,18 @@ struct EditedVertex {
   int level = 0, i = 0, j = 0;
 };
 
-// How edits differ from those of the step before: a hundred steps that each hold all edits would
-// soon be too long to read.
+// Difference of the edits to those of the step before. Storing all edits in each of a hundred steps
+// would exceed the size limit of a configuration file.
 struct EditChanges {
   std::vector<RegionReset> resets;
   std::vector<EditedVertex> gone;
-  std::vector<VertexEdit> edits;  // new ones and changed ones, after all that stay
+  std::vector<VertexEdit> edits;  // new and changed ones; they follow the unchanged ones
 };
 
 struct WrittenStep {
   std::string what;
-  BenchState state;                   // without its edits, where `edited` has them
-  std::optional<EditChanges> edited;  // since the step before
+  BenchState state;                   // without its edits if `edited` is set
+  std::optional<EditChanges> edited;  // changes since the step before
 };
 
 struct WrittenHistory {
@@ -72,16 +72,16 @@ void CheckValue(Report& report, const WrittenHistory& history) {
 
 using VertexKey = std::array<int, 3>;
 
-VertexKey KeyOf(const auto& vertex) { return {vertex.level, vertex.i, vertex.j}; }
+VertexKey ToKey(const auto& vertex) { return {vertex.level, vertex.i, vertex.j}; }
 
 EditChanges ChangesBetween(const EditScript& before, const EditScript& after) {
   std::map<VertexKey, std::optional<std::array<double, 3>>> was;
   for (const VertexEdit& edit : before.edits) {
-    was[KeyOf(edit)] = edit.offset;
+    was[ToKey(edit)] = edit.offset;
   }
   EditChanges changes{.resets = after.resets, .gone = {}, .edits = {}};
   for (const VertexEdit& edit : after.edits) {
-    const auto found = was.find(KeyOf(edit));
+    const auto found = was.find(ToKey(edit));
     if (found == was.end() || found->second != edit.offset) {
       changes.edits.push_back(edit);
     }
@@ -95,32 +95,33 @@ EditChanges ChangesBetween(const EditScript& before, const EditScript& after) {
   return changes;
 }
 
-EditScript Changed(const EditScript& before, const EditChanges& changes) {
+EditScript ApplyChanges(const EditScript& before, const EditChanges& changes) {
   std::set<VertexKey> other;
   for (const EditedVertex& vertex : changes.gone) {
-    other.insert(KeyOf(vertex));
+    other.insert(ToKey(vertex));
   }
   for (const VertexEdit& edit : changes.edits) {
-    other.insert(KeyOf(edit));
+    other.insert(ToKey(edit));
   }
   EditScript after{.resets = changes.resets, .edits = before.edits};
-  std::erase_if(after.edits, [&](const VertexEdit& edit) { return other.contains(KeyOf(edit)); });
+  std::erase_if(after.edits, [&](const VertexEdit& edit) { return other.contains(ToKey(edit)); });
   after.edits.insert(after.edits.end(), changes.edits.begin(), changes.edits.end());
   return after;
 }
 
 bool SameEdits(const EditScript& a, const EditScript& b) {
   return std::ranges::equal(a.edits, b.edits, [](const VertexEdit& x, const VertexEdit& y) {
-    return KeyOf(x) == KeyOf(y) && x.offset == y.offset;
+    return ToKey(x) == ToKey(y) && x.offset == y.offset;
   });
 }
 
-// before: the edits of the step before; null for the first.
-WrittenStep Written(const BenchStep& step, const EditScript* before) {
+// before: the edits of the step before; null for the first step. Edits whose order EditChanges
+// cannot reproduce are stored as a whole.
+WrittenStep ToWrittenStep(const BenchStep& step, const EditScript* before) {
   WrittenStep written{.what = step.what, .state = step.state, .edited = std::nullopt};
   if (before != nullptr) {
     EditChanges changes = ChangesBetween(*before, step.state.edits);
-    if (SameEdits(Changed(*before, changes), step.state.edits)) {  // else in another order
+    if (SameEdits(ApplyChanges(*before, changes), step.state.edits)) {
       written.state.edits = {};
       written.edited = std::move(changes);
     }
@@ -130,14 +131,33 @@ WrittenStep Written(const BenchStep& step, const EditScript* before) {
 
 }  // namespace
 
+LandmarkFile ToLandmarkFile(const BenchState& state) {
+  LandmarkFile file;
+  file.subject = state.subject.empty() ? "subject" : state.subject;
+  for (const BenchLandmark& l : state.landmarks) {
+    file.landmarks.push_back({.site = l.site,
+                              .point = l.point,
+                              .normal = l.normal,
+                              .depth_along_normal_mm = l.depth_along_normal_mm,
+                              .depth_closest_mm = l.depth_closest_mm,
+                              .certainty = l.certainty,
+                              .note = l.note});
+    file.proposed = file.proposed || l.proposed;
+  }
+  for (const BenchAbsent& absent : state.absent) {
+    file.absent.push_back({absent.site, absent.reason});
+  }
+  return file;
+}
+
 BenchHistory BeginHistory(BenchState state) {
   return {.steps = {{"began", std::move(state)}}, .now = 0};
 }
 
-BenchHistory Done(BenchHistory history, std::string what, BenchState state) {
+BenchHistory AddStep(BenchHistory history, std::string what, BenchState state) {
   history.steps.resize(static_cast<std::size_t>(history.now) + 1);
   history.steps.push_back({std::move(what), std::move(state)});
-  if (history.steps.size() > kMostSteps) {
+  if (history.steps.size() > kMaxHistorySteps) {
     history.steps.erase(history.steps.begin());
   }
   history.now = static_cast<int>(history.steps.size()) - 1;
@@ -164,7 +184,7 @@ std::string HistoryText(const BenchHistory& history) {
   WrittenHistory written{.steps = {}, .now = history.now};
   const EditScript* before = nullptr;
   for (const BenchStep& step : history.steps) {
-    written.steps.push_back(Written(step, before));
+    written.steps.push_back(ToWrittenStep(step, before));
     before = &step.state.edits;
   }
   return WriteConfig(written);
@@ -177,7 +197,7 @@ BenchHistory HistoryFromText(std::string_view text, const std::string& name) {
     history.steps.push_back({step.what, step.state});
     if (step.edited && history.steps.size() > 1) {
       history.steps.back().state.edits =
-          Changed(history.steps[history.steps.size() - 2].state.edits, *step.edited);
+          ApplyChanges(history.steps[history.steps.size() - 2].state.edits, *step.edited);
     }
   }
   return history;

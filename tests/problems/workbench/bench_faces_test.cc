@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/workbench/bench_pull.h"
+#include "problems/workbench/bench_faces.h"
 
 #include <gtest/gtest.h>
 
@@ -16,8 +16,8 @@ using testing::RandomSurface;
 const HSplineShape kShape{.patches_u = 6, .patches_v = 5, .max_level = 3};
 constexpr int kPerPatch = 2;
 
-// How far the face lies at most from where the moves of 1 mm predicted it, in mm.
-double FarthestFromPredicted(const HSplineSurface& face, int level, const Vec3& by) {
+// The largest distance of the pulled face's vertices from the prediction by moves of 1 mm, in mm.
+double MaxPredictionError(const HSplineSurface& face, int level, const Vec3& by) {
   Pull pull{.level = level, .uv = {0.37, 0.61}};
   const auto moves = PullMoves(face, pull, kPerPatch);
   pull.by_mm = by;
@@ -36,16 +36,16 @@ double FarthestFromPredicted(const HSplineSurface& face, int level, const Vec3& 
   return farthest;
 }
 
-TEST(PullMoves, AreExactWhereNoFinerDetailTurns) {
+TEST(PullMoves, AreExactIfNoFinerDetailTurns) {
   const HSplineSurface face = RandomSurface(kShape, 3);
-  EXPECT_LT(FarthestFromPredicted(face, kShape.max_level, {10, -20, 5}), 1e-6);
+  EXPECT_LT(MaxPredictionError(face, kShape.max_level, {10, -20, 5}), 1e-6);
 }
 
-TEST(PullMoves, ErrWithThePullWhereDetailTurnsAndFadeWithIt) {
+TEST(PullMoves, HaveAnErrorThatVanishesWithThePullIfDetailTurns) {
   const HSplineSurface face = RandomSurface(kShape, 3);
   const Vec3 by(2, -4, 1);
-  const double whole = FarthestFromPredicted(face, 1, by);
-  const double tenth = FarthestFromPredicted(face, 1, 0.1 * by);
+  const double whole = MaxPredictionError(face, 1, by);
+  const double tenth = MaxPredictionError(face, 1, 0.1 * by);
   EXPECT_GT(whole, 1e-3);
   EXPECT_LT(tenth, 0.2 * whole);
   EXPECT_LT(whole, 0.5 * by.norm());
