@@ -17,12 +17,10 @@ except ImportError:
 PARSER = MarkdownIt("commonmark").enable("table")
 ROOT = Path(__file__).resolve().parent.parent
 # Headings of the contents, and the documents below each. Those that are in none stand under the last one.
-PARTS = [
-    ("Start", ["README", "first-face", "workbench", "gallery"]),
-    ("Use", ["real-heads", "landmarks", "sites", "reading-results", "studies", "populations", "python", "mistakes", "reliability", "security"]),
-    ("The method", ["interpolation", "implicit", "hspline", "fit", "relaxation", "prior", "bust", "mathematics"]),
-    ("The code", ["architecture", "extending", "glossary"]),
-]
+# The folders of docs/ in the order of the contents. Pages of a folder are listed in the order of ORDER, the others after them by name.
+PARTS = [("Start", ""), ("Tutorials", "tutorial"), ("How to", "how-to"), ("Reference", "reference"), ("Explanation", "explanation"),
+         ("Experiments", "experiments")]
+ORDER = ["README", "first-face", "workbench", "gallery", "architecture"]
 CSS = """
 :root { color-scheme: light dark; --ink: #1d2126; --paper: #fff; --line: #dfe3e8; --link: #0b5a8f; --code: #f4f6f8 }
 @media (prefers-color-scheme: dark) { :root { --ink: #e6e9ec; --paper: #14171a; --line: #31363c; --link: #86c5f4; --code: #1d2126 } }
@@ -52,8 +50,13 @@ summary { cursor: pointer; color: var(--link) } nav details { display: none }
 def documents():
     """The documents by name, README first."""
     found = {"README": ROOT / "README.md"}
-    found.update({path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))})
+    found.update({path.stem: path for path in sorted((ROOT / "docs").rglob("*.md"))})
     return found
+
+
+def folder_of(path):
+    """The folder below docs/ that holds a document; empty for README.md."""
+    return path.parent.name if path.parent.parent.name == "docs" else ""
 
 
 def page_of(name):
@@ -125,16 +128,14 @@ class Site:
                     second.content = self.titles[name]
 
     def contents(self, current):
-        listed = {name for _, names in PARTS for name in names}
         text = ""
-        for part, names in PARTS:
-            names = [name for name in names if name in self.documents]
-            if part == PARTS[-1][0]:
-                names += [name for name in self.documents if name not in listed]
+        for part, folder in PARTS:
+            names = [name for name, path in self.documents.items() if folder_of(path) == folder]
+            names.sort(key=lambda name: (ORDER.index(name) if name in ORDER else len(ORDER), self.titles[name]))
             rows = "".join(
                 f'<li><a href="{page_of(name)}"{" aria-current=page" if name == current else ""}>'
                 f"{html.escape(self.titles[name])}</a></li>" for name in names)
-            text += f"<p>{part}</p><ul>{rows}</ul>"
+            text += f"<p>{part}</p><ul>{rows}</ul>" if rows else ""
         return text
 
     def write(self):

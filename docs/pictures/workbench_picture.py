@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of docs/workbench.md, of the page as it is: workbench_picture.py PROGRAM FOLDER
+"""The pictures of docs/tutorial/workbench.md, of the page as it is: workbench_picture.py PROGRAM FOLDER
 
 The head of configs/demo.yaml, in a window of 1440 x 900 pixels: workbench-landmarks.png, a site with what is known of it; and
 workbench.png, the face once a depth was changed. Needs chromium and chromedriver."""
@@ -8,8 +8,8 @@ import pathlib
 import sys
 import tempfile
 
-SOURCE = pathlib.Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(SOURCE / "tests/problems/serving"))
+SOURCE = pathlib.Path(__file__).resolve().parent.parent.parent
+sys.path.insert(0, str(SOURCE / "tests/problems/app/workbench"))
 import webdriver
 from workbench_page import Workbench, change_depth, take_picture
 
