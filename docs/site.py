@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The documents as static pages: site.py OUT. README.md becomes index.html, docs/NAME.md NAME.html; pictures and other files of the
-project that they name lie in files/. The pages ask no network for anything. Needs Debian's python3-markdown-it; `make site` installs it."""
+"""Makes static pages of the documents: site.py OUT. README.md becomes index.html, docs/FOLDER/NAME.md FOLDER-NAME.html, and docs/FOLDER/README.md
+FOLDER.html. Pictures and other files of the project that the documents link to are copied to files/. The pages load nothing from a network. Needs
+Debian's python3-markdown-it, which `make site` installs."""
 import html
 import os
 import re
@@ -12,17 +13,14 @@ from pathlib import Path
 try:
     from markdown_it import MarkdownIt
 except ImportError:
-    sys.exit("site.py: there is no markdown_it for this Python; install python3-markdown-it, or run `make site`, which does")
+    sys.exit("site.py: this Python has no markdown_it; install python3-markdown-it, or run `make site`, which installs it")
 
 PARSER = MarkdownIt("commonmark").enable("table")
 ROOT = Path(__file__).resolve().parent.parent
-# Headings of the contents, and the documents below each. Those that are in none stand under the last one.
-PARTS = [
-    ("Start", ["README", "first-face", "workbench", "gallery"]),
-    ("Use", ["real-heads", "landmarks", "sites", "reading-results", "studies", "populations", "python", "mistakes", "reliability", "security"]),
-    ("The method", ["interpolation", "implicit", "hspline", "fit", "relaxation", "prior", "bust", "mathematics"]),
-    ("The code", ["architecture", "extending", "glossary"]),
-]
+# The folders of docs/ in the order of the contents, with their headings. Within a folder the pages of ORDER come first, then the others by title.
+PARTS = [("Start", ""), ("Tutorials", "tutorial"), ("How to", "how-to"), ("Reference", "reference"), ("Explanation", "explanation"),
+         ("Experiments", "experiments")]
+ORDER = ["README.md", "first-face.md", "first-study.md", "workbench.md", "gallery.md", "install.md", "architecture.md", "commands.md", "options.md"]
 CSS = """
 :root { color-scheme: light dark; --ink: #1d2126; --paper: #fff; --line: #dfe3e8; --link: #0b5a8f; --code: #f4f6f8 }
 @media (prefers-color-scheme: dark) { :root { --ink: #e6e9ec; --paper: #14171a; --line: #31363c; --link: #86c5f4; --code: #1d2126 } }
@@ -39,7 +37,7 @@ code { background: var(--code); border-radius: 4px; padding: 1px 3px; font: 0.88
 .wide { overflow-x: auto } table { border-collapse: collapse; font-size: 14px }
 th, td { text-align: left; vertical-align: top; border-bottom: 1px solid var(--line); padding: 6px 12px 6px 0; min-width: 5em }
 summary { cursor: pointer; color: var(--link) } nav details { display: none }
-/* A shadow at the side to which a table goes on. */
+/* A shadow at the side where a wide table continues. */
 .wide { background: linear-gradient(to right, var(--paper) 50%, transparent) left / 40px 100% local no-repeat,
   linear-gradient(to left, var(--paper) 50%, transparent) right / 40px 100% local no-repeat,
   linear-gradient(to right, var(--line), transparent) left / 14px 100% scroll no-repeat,
@@ -50,14 +48,20 @@ summary { cursor: pointer; color: var(--link) } nav details { display: none }
 
 
 def documents():
-    """The documents by name, README first."""
-    found = {"README": ROOT / "README.md"}
-    found.update({path.stem: path for path in sorted((ROOT / "docs").glob("*.md"))})
-    return found
+    """The documents, README.md first."""
+    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 
 
-def page_of(name):
-    return "index.html" if name == "README" else name + ".html"
+def folder_of(path):
+    """The folder below docs/ that holds a document; empty for the README.md of the project."""
+    return "" if path.parent == ROOT else path.parent.name
+
+
+def page_of(path):
+    """The name of a document's page. All pages lie in one folder, so that their links to each other and to files/ are short."""
+    if path.parent == ROOT:
+        return "index.html"
+    return path.parent.name + (".html" if path.name == "README.md" else f"-{path.stem}.html")
 
 
 def plain(tokens):
@@ -65,7 +69,7 @@ def plain(tokens):
 
 
 def anchor(title, used):
-    """What a heading is called by those that link to it, as on GitHub."""
+    """The anchor of a heading, as GitHub makes it."""
     slug = re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
     used[slug] = used.get(slug, -1) + 1
     return slug if used[slug] == 0 else f"{slug}-{used[slug]}"
@@ -75,23 +79,22 @@ class Site:
     def __init__(self, out):
         self.out = out
         self.documents = documents()
-        self.names = {path.resolve(): name for name, path in self.documents.items()}
         self.titles = {}
 
     def link(self, target, source):
-        """Where a link of the document `source` leads on the site."""
+        """The target on the site of a link in the document `source`."""
         path, _, fragment = target.partition("#")
         if "://" in target or target.startswith("mailto:") or not path:
             return target
         file = (source.parent / path).resolve()
         if not file.is_file():
-            sys.exit(f"site.py: {source.relative_to(ROOT)}: links to {target}, which is no file of the project")
-        if file in self.names:
-            return page_of(self.names[file]) + (f"#{fragment}" if fragment else "")
+            sys.exit(f"site.py: {source.relative_to(ROOT)}: links to {target}, which is not a file of the project")
+        if file in self.documents:
+            return page_of(file) + (f"#{fragment}" if fragment else "")
         return self.copied(file)
 
     def copied(self, file):
-        """A file of the project beside the pages."""
+        """Copies a file of the project beside the pages and returns its link."""
         name = f"files/{file.relative_to(ROOT)}"
         (self.out / name).parent.mkdir(parents=True, exist_ok=True)
         shutil.copyfile(file, self.out / name)
@@ -110,46 +113,35 @@ class Site:
                         child.attrSet(attribute, self.link(child.attrGet(attribute), source))
         return tokens
 
-    def title(self, name, tokens):
+    def title(self, path, tokens):
         for token, inline in zip(tokens, tokens[1:]):
             if token.type == "heading_open":
                 return plain(inline.children)
-        return name
-
-    def name_links(self, tokens):
-        """A link that is called by a document's file is called by its title."""
-        for token in tokens:
-            for first, second in zip(token.children or [], (token.children or [])[1:]):
-                name = Path(second.content).stem
-                if first.type == "link_open" and second.content.endswith(".md") and name in self.titles:
-                    second.content = self.titles[name]
+        return path.stem
 
     def contents(self, current):
-        listed = {name for _, names in PARTS for name in names}
         text = ""
-        for part, names in PARTS:
-            names = [name for name in names if name in self.documents]
-            if part == PARTS[-1][0]:
-                names += [name for name in self.documents if name not in listed]
+        for part, folder in PARTS:
+            paths = [path for path in self.documents if folder_of(path) == folder]
+            paths.sort(key=lambda path: (ORDER.index(path.name) if path.name in ORDER else len(ORDER), self.titles[path]))
             rows = "".join(
-                f'<li><a href="{page_of(name)}"{" aria-current=page" if name == current else ""}>'
-                f"{html.escape(self.titles[name])}</a></li>" for name in names)
-            text += f"<p>{part}</p><ul>{rows}</ul>"
+                f'<li><a href="{page_of(path)}"{" aria-current=page" if path == current else ""}>'
+                f"{html.escape(self.titles[path])}</a></li>" for path in paths)
+            text += f"<p>{part}</p><ul>{rows}</ul>" if rows else ""
         return text
 
     def write(self):
         self.out.mkdir(parents=True, exist_ok=True)
         (self.out / "site.css").write_text(CSS.lstrip())
-        parsed = {name: self.parse(path) for name, path in self.documents.items()}
-        self.titles = {name: self.title(name, tokens) for name, tokens in parsed.items()}
-        for name, tokens in parsed.items():
-            self.name_links(tokens)
+        parsed = {path: self.parse(path) for path in self.documents}
+        self.titles = {path: self.title(path, tokens) for path, tokens in parsed.items()}
+        for path, tokens in parsed.items():
             body = PARSER.renderer.render(tokens, PARSER.options, {})
             body = body.replace("<table>", '<div class="wide"><table>').replace("</table>", "</table></div>")
-            contents = self.contents(name)
-            (self.out / page_of(name)).write_text(
+            contents = self.contents(path)
+            (self.out / page_of(path)).write_text(
                 f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">'
-                f'<title>{html.escape(self.titles[name])}</title><link rel="icon" href="data:,"><link rel="stylesheet" href="site.css"></head>\n'
+                f'<title>{html.escape(self.titles[path])}</title><link rel="icon" href="data:,"><link rel="stylesheet" href="site.css"></head>\n'
                 f'<body><div class="page"><nav aria-label="Documents"><details><summary>Documents</summary>{contents}</details><div>{contents}</div></nav>\n'
                 f"<main>\n{body}</main></div></body></html>\n")
 
