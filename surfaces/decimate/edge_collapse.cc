@@ -10,46 +10,53 @@
 namespace semblance {
 namespace {
 
-HalfEdgeIndex FirstOfFan(const HalfEdges& mesh, HalfEdgeIndex h) {
-  while (mesh.Twin(h) >= 0) {
-    h = mesh.TurnRight(h);
+using OpenMesh::HalfedgeHandle;
+
+// The first half-edge of the fan of faces that h belongs to, which starts at a border.
+HalfedgeHandle FirstOfFan(const HalfEdgeMesh& mesh, HalfedgeHandle h) {
+  while (!mesh.is_boundary(mesh.opposite_halfedge_handle(h))) {
+    h = mesh.cw_rotated_halfedge_handle(h);
   }
   return h;
 }
 
 }  // namespace
 
-void EdgeNeighbourhood::AppendFan(const HalfEdges& mesh, HalfEdgeIndex from, HalfEdgeIndex before) {
-  for (HalfEdgeIndex h = from; h >= 0 && h != before; h = mesh.TurnLeft(h)) {
-    spokes.push_back(h);
-    ring.push_back(mesh.To(h));
-    if (mesh.From(h) == gone) {
-      of_gone.push_back(h);
+// Goes counter-clockwise around the start of `from`, up to the half-edge `before` or to a border,
+// whose vertex ends the ring.
+void EdgeNeighbourhood::AppendFan(const HalfEdgeMesh& mesh, HalfedgeHandle from,
+                                  HalfedgeHandle before) {
+  const bool around_gone = mesh.from_vertex_handle(from).idx() == gone;
+  for (HalfedgeHandle h = from; h != before; h = mesh.ccw_rotated_halfedge_handle(h)) {
+    ring.push_back(mesh.to_vertex_handle(h).idx());
+    if (mesh.is_boundary(h)) {
+      return;
     }
+    spokes.push_back(h);
+    at_gone.push_back(around_gone);
   }
 }
 
-void EdgeNeighbourhood::Gather(const HalfEdges& mesh, HalfEdgeIndex h) {
-  const bool turn = mesh.IsOnBorder(mesh.To(h)) && !mesh.IsOnBorder(mesh.From(h));
-  edge = turn ? mesh.Twin(h) : h;
-  keep = mesh.From(edge);
-  gone = mesh.To(edge);
+void EdgeNeighbourhood::Gather(const HalfEdgeMesh& mesh, HalfedgeHandle h) {
+  edge = h;
+  keep = mesh.from_vertex_handle(edge).idx();
+  gone = mesh.to_vertex_handle(edge).idx();
   spokes.clear();
   ring.clear();
-  of_gone.clear();
-  const HalfEdgeIndex back = mesh.Twin(edge), end = HalfEdges::Next(edge);
-  on_border = back < 0;
-  closed = !mesh.IsOnBorder(keep);
+  at_gone.clear();
+  const HalfedgeHandle back = mesh.opposite_halfedge_handle(edge),
+                       end = mesh.next_halfedge_handle(edge),
+                       after = mesh.ccw_rotated_halfedge_handle(edge);
+  on_border = mesh.is_boundary(back);
+  closed = !mesh.is_boundary(OpenMesh::VertexHandle(keep));
   if (on_border) {
     AppendFan(mesh, FirstOfFan(mesh, end), end);
   } else {
-    const HalfEdgeIndex first = closed ? mesh.TurnLeft(edge) : FirstOfFan(mesh, edge);
-    AppendFan(mesh, first, HalfEdges::Next(back));
-    AppendFan(mesh, mesh.TurnLeft(back), end);
+    AppendFan(mesh, closed ? after : FirstOfFan(mesh, edge), mesh.next_halfedge_handle(back));
+    AppendFan(mesh, mesh.ccw_rotated_halfedge_handle(back), end);
   }
   if (!closed) {
-    AppendFan(mesh, mesh.TurnLeft(edge), -1);
-    ring.push_back(spokes.empty() ? -1 : mesh.From(HalfEdges::Previous(spokes.back())));
+    AppendFan(mesh, after, HalfedgeHandle());
   }
 }
 

@@ -7,28 +7,29 @@
 #include <vector>
 
 #include "surfaces/base/geometry.h"
-#include "surfaces/mesh/half_edges.h"
+#include "surfaces/mesh/half_edge_mesh.h"
 
 namespace semblance {
 
 // The triangles around an edge from `keep` to `gone`. Outer triangle i is (apex, ring[i],
-// ring[i + 1]), its apex keep or gone; after the collapse its apex is the merged vertex. The one or
-// two triangles at the edge itself disappear.
+// ring[i + 1]); its apex is keep or gone, and after the collapse the merged vertex. The one or two
+// triangles at the edge itself disappear. All vertices are indices in the half-edge mesh.
 struct EdgeNeighbourhood {
   std::int32_t keep = -1, gone = -1;
-  HalfEdgeIndex edge = -1;             // from keep to gone
-  std::vector<HalfEdgeIndex> spokes;   // of the outer triangles: from the apex to ring[i]
-  std::vector<HalfEdgeIndex> of_gone;  // the spokes that leave `gone`
-  std::vector<std::int32_t> ring;
-  bool closed = false;     // neither end is on a border: the last of the ring meets the first
-  bool on_border = false;  // the edge itself is
+  OpenMesh::HalfedgeHandle edge;                 // from keep to gone; it has a face
+  std::vector<OpenMesh::HalfedgeHandle> spokes;  // per outer triangle: from its apex to ring[i]
+  std::vector<std::int32_t> ring;                // counter-clockwise
+  std::vector<bool> at_gone;                     // per outer triangle: whether its apex is gone
+  bool closed = false;     // keep is not on a border: the ring's last vertex meets its first
+  bool on_border = false;  // the edge itself is on a border
 
-  // h: an edge that is on the border if both its ends are. If one end is on the border, that end is
-  // kept.
-  void Gather(const HalfEdges& mesh, HalfEdgeIndex h);
+  // h: a half-edge from keep to gone. If gone is on a border, keep is too and so is the edge; then h
+  // has a face.
+  void Gather(const HalfEdgeMesh& mesh, OpenMesh::HalfedgeHandle h);
 
  private:
-  void AppendFan(const HalfEdges& mesh, HalfEdgeIndex from, HalfEdgeIndex before);
+  void AppendFan(const HalfEdgeMesh& mesh, OpenMesh::HalfedgeHandle from,
+                 OpenMesh::HalfedgeHandle before);
 };
 
 // The positions of an EdgeNeighbourhood, in mm: triangle i was (keep or gone, ring[i], ring[i + 1])
