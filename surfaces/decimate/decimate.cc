@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <span>
 #include <utility>
 #include <vector>
 
@@ -149,7 +148,8 @@ class Decimator {
 
  private:
   void HoldVertices();
-  void AddQuadrics(HalfedgeHandle side, double times);
+  void AddQuadrics(const std::vector<std::int32_t>& triangles, double times);
+  void AddQuadrics(std::int32_t triangle, double times);
   HalfedgeHandle KeptToGone(EdgeHandle edge) const;
   MergeTarget TargetOf(HalfedgeHandle h) const;
   void Evaluate(EdgeHandle edge);
@@ -160,13 +160,12 @@ class Decimator {
   void Sweep(float cost_limit);
   void TryCollapse(EdgeHandle edge);
   bool KeepsTopology();
-  std::span<const HalfedgeHandle> SidesOfEdge();
   void SetGeometry(const Vec3& target);
   void GatherSamples();
   bool IsWithinBounds();
   void Collapse();
-  void ForgetTrianglesAtEdge();
-  void AddQuadricsAround(double times);
+  void ForgetEdges();
+  void Forget(HalfedgeHandle side);
   void EvaluateAround();
   void ReassignSamples();
   Remains RemainingMesh();
@@ -184,7 +183,6 @@ class Decimator {
   std::vector<float> cheapest_;
   float dearest_ = 0;  // the highest limit of a sweep so far
   EdgeNeighbourhood around_;
-  std::array<HalfedgeHandle, 2> sides_;
   CollapseGeometry geometry_;
   CollapseError error_;
   std::vector<std::int32_t> sampled_;  // original vertices; geometry_.samples are their positions
@@ -208,7 +206,7 @@ Decimator::Decimator(const TriMesh& mesh, const DecimateOptions& options)
   waiting_.reserve(costs_.size());
   cheapest_.reserve(costs_.size());
   for (const auto face : edges_.faces()) {
-    AddQuadrics(edges_.halfedge_handle(face), 1);
+    AddQuadrics(face.idx(), 1);
   }
 }
 
@@ -226,9 +224,15 @@ void Decimator::HoldVertices() {
   }
 }
 
-// Adds the quadrics of the triangle to the left of `side`, and of its sides on a border, to those of
-// its corners.
-void Decimator::AddQuadrics(HalfedgeHandle side, double times) {
+void Decimator::AddQuadrics(const std::vector<std::int32_t>& triangles, double times) {
+  for (const std::int32_t t : triangles) {
+    AddQuadrics(t, times);
+  }
+}
+
+// Adds the quadrics of the triangle, and of its sides on a border, to those of its corners.
+void Decimator::AddQuadrics(std::int32_t triangle, double times) {
+  const HalfedgeHandle side = edges_.halfedge_handle(OpenMesh::FaceHandle(triangle));
   const std::array<HalfedgeHandle, 3> sides = {side, edges_.next_halfedge_handle(side),
                                                edges_.prev_halfedge_handle(side)};
   std::array<DecimatedVertex*, 3> corners;
@@ -407,13 +411,7 @@ bool Decimator::KeepsTopology() {
     }
     vertices_[v].met = attempts_;
   }
-  return around_.spokes.size() >= (around_.closed ? 3u : 1u);
-}
-
-// The half-edges of the edge that have a face: one on a border, else two.
-std::span<const HalfedgeHandle> Decimator::SidesOfEdge() {
-  sides_ = {around_.edge, edges_.opposite_halfedge_handle(around_.edge)};
-  return std::span(sides_).first(around_.on_border ? 1 : 2);
+  return around_.outer.size() >= (around_.closed ? 3u : 1u);
 }
 
 void Decimator::SetGeometry(const Vec3& target) {
@@ -423,9 +421,11 @@ void Decimator::SetGeometry(const Vec3& target) {
   geometry_.closed = around_.closed;
   geometry_.on_border = around_.on_border;
   geometry_.opposite.clear();
-  for (const HalfedgeHandle h : SidesOfEdge()) {
-    const VertexHandle opposite = edges_.to_vertex_handle(edges_.next_halfedge_handle(h));
-    geometry_.opposite.push_back(vertices_[opposite.idx()].position);
+  for (const HalfedgeHandle h :
+       {around_.edge, edges_.opposite_halfedge_handle(around_.edge)}) {
+    if (!edges_.is_boundary(h)) {
+      geometry_.opposite.push_back(vertices_[edges_.opposite_vh(h).idx()].position);
+    }
   }
   geometry_.ring.clear();
   for (const std::int32_t v : around_.ring) {
@@ -437,11 +437,11 @@ void Decimator::SetGeometry(const Vec3& target) {
 // The original vertices that belong to the triangles around the edge.
 void Decimator::GatherSamples() {
   sampled_.clear();
-  for (const HalfedgeHandle h : SidesOfEdge()) {
-    originals_.AppendOf(edges_.face_handle(h).idx(), sampled_);
+  for (const std::int32_t t : around_.inner) {
+    originals_.AppendOf(t, sampled_);
   }
-  for (const HalfedgeHandle spoke : around_.spokes) {
-    originals_.AppendOf(edges_.face_handle(spoke).idx(), sampled_);
+  for (const std::int32_t t : around_.outer) {
+    originals_.AppendOf(t, sampled_);
   }
   geometry_.samples.clear();
   for (const std::int32_t v : sampled_) {
@@ -466,43 +466,40 @@ bool Decimator::IsWithinBounds() {
 }
 
 void Decimator::ReassignSamples() {
-  for (const HalfedgeHandle spoke : around_.spokes) {
-    originals_.Clear(edges_.face_handle(spoke).idx());
+  for (const std::int32_t t : around_.outer) {
+    originals_.Clear(t);
   }
   for (std::size_t n = 0; n < sampled_.size(); ++n) {
-    const HalfedgeHandle spoke = around_.spokes[error_.triangle_of[n]];
-    originals_.Assign(edges_.face_handle(spoke).idx(), sampled_[n], error_.distance_mm[n]);
+    originals_.Assign(around_.outer[error_.triangle_of[n]], sampled_[n], error_.distance_mm[n]);
   }
 }
 
 void Decimator::Collapse() {
-  ForgetTrianglesAtEdge();
-  AddQuadricsAround(-1);
-  triangles_ -= around_.on_border ? 1 : 2;
+  ForgetEdges();
+  AddQuadrics(around_.inner, -1);
+  AddQuadrics(around_.outer, -1);
+  triangles_ -= static_cast<int>(around_.inner.size());
   edges_.collapse(edges_.opposite_halfedge_handle(around_.edge));
   ++collapses_;
   vertices_[around_.keep].position = geometry_.target;
-  AddQuadricsAround(1);
+  AddQuadrics(around_.outer, 1);
   ReassignSamples();
   EvaluateAround();
 }
 
-// Takes out the quadrics of the triangles that disappear, and the edges that go with them: of the
-// sides of those triangles OpenMesh keeps the ones at `keep`.
-void Decimator::ForgetTrianglesAtEdge() {
-  costs_[edges_.edge_handle(around_.edge).idx()] = {kNever, -1};
-  for (const HalfedgeHandle h : SidesOfEdge()) {
-    const HalfedgeHandle at_gone = h == around_.edge ? edges_.next_halfedge_handle(h)
-                                                     : edges_.prev_halfedge_handle(h);
-    costs_[edges_.edge_handle(at_gone).idx()] = {kNever, -1};
-    AddQuadrics(h, -1);
+// Forgets the edges that go with the collapse: the edge itself and, of the other sides of the
+// triangles that disappear, those at `gone`.
+void Decimator::ForgetEdges() {
+  const HalfedgeHandle edge = around_.edge, back = edges_.opposite_halfedge_handle(edge);
+  Forget(edge);
+  Forget(edges_.next_halfedge_handle(edge));
+  if (!edges_.is_boundary(back)) {
+    Forget(edges_.prev_halfedge_handle(back));
   }
 }
 
-void Decimator::AddQuadricsAround(double times) {
-  for (const HalfedgeHandle spoke : around_.spokes) {
-    AddQuadrics(spoke, times);
-  }
+void Decimator::Forget(HalfedgeHandle side) {
+  costs_[edges_.edge_handle(side).idx()] = {.cost = kNever, .evaluated = -1};
 }
 
 // Evaluates the edges at the merged vertex. The edges farther out, at the ring, are stale now; they

@@ -32,7 +32,7 @@ void EdgeNeighbourhood::AppendFan(const HalfEdgeMesh& mesh, HalfedgeHandle from,
     if (mesh.is_boundary(h)) {
       return;
     }
-    spokes.push_back(h);
+    outer.push_back(mesh.face_handle(h).idx());
     at_gone.push_back(around_gone);
   }
 }
@@ -41,9 +41,10 @@ void EdgeNeighbourhood::Gather(const HalfEdgeMesh& mesh, HalfedgeHandle h) {
   edge = h;
   keep = mesh.from_vertex_handle(edge).idx();
   gone = mesh.to_vertex_handle(edge).idx();
-  spokes.clear();
-  ring.clear();
+  inner = {mesh.face_handle(edge).idx()};
+  outer.clear();
   at_gone.clear();
+  ring.clear();
   const HalfedgeHandle back = mesh.opposite_halfedge_handle(edge),
                        end = mesh.next_halfedge_handle(edge),
                        after = mesh.ccw_rotated_halfedge_handle(edge);
@@ -52,6 +53,7 @@ void EdgeNeighbourhood::Gather(const HalfEdgeMesh& mesh, HalfedgeHandle h) {
   if (on_border) {
     AppendFan(mesh, FirstOfFan(mesh, end), end);
   } else {
+    inner.push_back(mesh.face_handle(back).idx());
     AppendFan(mesh, closed ? after : FirstOfFan(mesh, edge), mesh.next_halfedge_handle(back));
     AppendFan(mesh, mesh.ccw_rotated_halfedge_handle(back), end);
   }
