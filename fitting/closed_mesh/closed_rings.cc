@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "surfaces/base/geometry.h"
-#include "surfaces/mesh/half_edges.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 namespace {
@@ -184,18 +184,9 @@ class Remover {
 }  // namespace
 
 std::vector<Ring> RingsOf(const TriMesh& mesh) {
-  const HalfEdges edges(mesh, "parameters");
-  std::vector<Ring> rings(mesh.points.size());
-  for (HalfEdgeIndex first = 0; first < edges.End(); ++first) {
-    if (edges.IsAlive(first) && rings[edges.From(first)].empty()) {
-      Ring& ring = rings[edges.From(first)];
-      HalfEdgeIndex h = first;
-      do {
-        ring.push_back(edges.To(h));
-        h = edges.TurnLeft(h);
-      } while (h != first);
-      std::rotate(ring.begin(), std::ranges::min_element(ring), ring.end());
-    }
+  std::vector<Ring> rings = VertexRings(mesh, "parameters");
+  for (Ring& ring : rings) {
+    std::rotate(ring.begin(), std::ranges::min_element(ring), ring.end());
   }
   return rings;
 }

@@ -25,7 +25,7 @@ struct ClosedRings {
   std::vector<std::size_t> rounds = {};  // how many removals there were before each round
 };
 
-// The rings of a mesh, each from its least vertex on. Throws InputError as HalfEdges does.
+// The rings of a mesh, each from its least vertex on. Throws InputError if the mesh is no manifold.
 //   mesh: closed, every point used.
 std::vector<Ring> RingsOf(const TriMesh& mesh);
 

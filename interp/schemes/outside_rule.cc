@@ -8,7 +8,7 @@
 
 #include "interp/schemes/mean.h"
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

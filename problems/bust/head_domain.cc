@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/half_edges.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 namespace {
@@ -21,28 +21,7 @@ constexpr double kTurn = 2 * std::numbers::pi;
 constexpr double kRound_mm = 600, kUp_mm = 450;  // about what u and v measure on a head
 constexpr double kDensity = 0.5, kPower = 0.15;  // how much crowding and short edges count
 
-using Loop = std::vector<std::int32_t>;  // points, the surface on the left
-
-std::vector<Loop> BorderLoops(const TriMesh& mesh) {
-  std::map<std::int32_t, std::int32_t> next;
-  const HalfEdges edges(mesh, "head");
-  for (HalfEdgeIndex h = 0; h < edges.End(); ++h) {
-    if (edges.IsAlive(h) && edges.Twin(h) < 0) {
-      next[edges.From(h)] = edges.To(h);
-    }
-  }
-  std::vector<Loop> loops;
-  while (!next.empty()) {
-    Loop loop = {next.begin()->first};
-    for (auto at = next.begin(); at != next.end(); at = next.find(loop.back())) {
-      loop.push_back(at->second);
-      next.erase(at);
-    }
-    loop.pop_back();  // the first again
-    loops.push_back(std::move(loop));
-  }
-  return loops;
-}
+using Loop = VertexLoop;
 
 double Length(const TriMesh& mesh, const Loop& loop) {
   double sum = 0;
@@ -299,7 +278,7 @@ HeadDomain LayOutHead(const TriMesh& head, const std::string& name) {
   if (ConnectedComponents(head).count != 1) {
     throw InputError(fmt::format("{}: the head is not one piece", name));
   }
-  HeadDomain domain{.mesh = head, .uv = {}, .rims = BorderLoops(head)};
+  HeadDomain domain{.mesh = head, .uv = {}, .rims = BorderLoops(head, "head")};
   if (domain.rims.empty()) {
     throw InputError(fmt::format("{}: the head has no border; it must be open at the neck", name));
   }

@@ -18,7 +18,6 @@
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
-#include "surfaces/mesh/outer_surface.h"
 
 namespace semblance {
 namespace {

@@ -11,7 +11,7 @@
 #include "fitting/plan/fit_result.h"
 #include "surfaces/base/auto_or.h"
 #include "surfaces/base/fields.h"
-#include "surfaces/mesh/point_query.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 

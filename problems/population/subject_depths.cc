@@ -16,7 +16,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
-#include "surfaces/mesh/outer_surface.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "fitting/shape_model/shape_parameters.h"
 #include "surfaces/base/parallel.h"
-#include "surfaces/mesh/vertex_clusters.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 namespace {

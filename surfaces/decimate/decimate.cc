@@ -177,8 +177,8 @@ class Decimator {
   HalfEdgeMesh& edges_;  // of half_edges_
   std::vector<DecimatedVertex> vertices_;
   OriginalVertices originals_;
-  std::vector<EdgeCost> costs_;  // per edge
-  std::vector<EdgeHandle> alive_;  // edges, ascending
+  std::vector<EdgeCost> costs_;      // per edge
+  std::vector<EdgeHandle> alive_;    // edges, ascending
   std::vector<EdgeHandle> waiting_;  // edges that have a cost, ascending
   std::vector<float> cheapest_;
   float dearest_ = 0;  // the highest limit of a sweep so far
@@ -213,7 +213,7 @@ Decimator::Decimator(const TriMesh& mesh, const DecimateOptions& options)
 void Decimator::HoldVertices() {
   vertices_.reserve(edges_.n_vertices());
   for (const VertexHandle v : edges_.vertices()) {
-    const Hold hold = IsPinched(edges_, v)     ? Hold::kLocked
+    const Hold hold = IsPinched(edges_, v)    ? Hold::kLocked
                       : edges_.is_boundary(v) ? Hold::kBorder
                                               : Hold::kFree;
     vertices_.push_back({.position = edges_.point(v), .hold = hold, .quadric = {}});
@@ -421,8 +421,7 @@ void Decimator::SetGeometry(const Vec3& target) {
   geometry_.closed = around_.closed;
   geometry_.on_border = around_.on_border;
   geometry_.opposite.clear();
-  for (const HalfedgeHandle h :
-       {around_.edge, edges_.opposite_halfedge_handle(around_.edge)}) {
+  for (const HalfedgeHandle h : {around_.edge, edges_.opposite_halfedge_handle(around_.edge)}) {
     if (!edges_.is_boundary(h)) {
       geometry_.opposite.push_back(vertices_[edges_.opposite_vh(h).idx()].position);
     }

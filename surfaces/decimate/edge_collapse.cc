@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

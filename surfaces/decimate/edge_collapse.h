@@ -16,16 +16,16 @@ namespace semblance {
 // triangles at the edge itself disappear. All vertices are indices in the half-edge mesh.
 struct EdgeNeighbourhood {
   std::int32_t keep = -1, gone = -1;
-  OpenMesh::HalfedgeHandle edge;         // from keep to gone; it has a face
-  std::vector<std::int32_t> inner;       // the faces of the triangles at the edge
-  std::vector<std::int32_t> outer;       // the faces of the outer triangles
-  std::vector<bool> at_gone;             // per outer triangle: whether its apex is gone
-  std::vector<std::int32_t> ring;        // counter-clockwise
+  OpenMesh::HalfedgeHandle edge;    // from keep to gone; it has a face
+  std::vector<std::int32_t> inner;  // the faces of the triangles at the edge
+  std::vector<std::int32_t> outer;  // the faces of the outer triangles
+  std::vector<bool> at_gone;        // per outer triangle: whether its apex is gone
+  std::vector<std::int32_t> ring;   // counter-clockwise
   bool closed = false;     // keep is not on a border: the ring's last vertex meets its first
   bool on_border = false;  // the edge itself is on a border
 
-  // h: a half-edge from keep to gone. If gone is on a border, keep is too and so is the edge; then h
-  // has a face.
+  // h: a half-edge from keep to gone. If gone is on a border, keep is too and so is the edge; then
+  // h has a face.
   void Gather(const HalfEdgeMesh& mesh, OpenMesh::HalfedgeHandle h);
 
  private:

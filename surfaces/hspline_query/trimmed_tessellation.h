@@ -3,7 +3,7 @@
 #pragma once
 
 #include "surfaces/hspline_query/tessellate.h"
-#include "surfaces/mesh/point_query.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 

@@ -10,9 +10,9 @@
 namespace semblance {
 namespace {
 
-// OpenMesh reports each face that it refuses to std::cerr, but a library must not print. The streams
-// belong to the whole process, so they are switched off once: switching them on again after each
-// mesh would be a race between threads.
+// OpenMesh reports each face that it refuses to std::cerr, but a library must not print. The
+// streams belong to the whole process, so they are switched off once: switching them on again after
+// each mesh would be a race between threads.
 void SilenceOpenMesh() {
   [[maybe_unused]] static const bool kSilent = [] {
     omerr().disable();

@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "surfaces/mesh_files/read_parts.h"
 #include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {

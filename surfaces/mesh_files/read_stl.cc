@@ -13,7 +13,6 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh_files/read_parts.h"
 #include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {

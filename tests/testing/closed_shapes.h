@@ -11,7 +11,7 @@
 #include "surfaces/base/random.h"
 #include "surfaces/hspline/hspline_surface.h"
 #include "surfaces/marching/polygonize.h"
-#include "surfaces/mesh/remesh.h"
+#include "surfaces/mesh/skull_fill.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance::testing {
