@@ -1,4 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+// Connectivity and collapses are OpenMesh's; the order of the collapses is our own. A sweep
+// collapses the cheapest part of all edges in index order and checks each edge once, when it is
+// about to collapse. OpenMesh's Decimater cannot do that. It asks for the final priority of every
+// half-edge around the removed vertex, so that the costly check against the original surface runs
+// some 40 times per collapse, and it cannot refuse a collapse whose surroundings have changed
+// since. Two real skulls (Visible Human and CT head, 394 and 416 thousand triangles) to 14,000
+// triangles:
+//                                   CPU time, ratio   RMS, mm       largest, mm
+//   own half-edges (former)         1       1         0.137 0.211   1.23  1.62
+//   OpenMesh half-edges, sweeps     1.06    1.06      0.139 0.205   1.13  1.46
+//   OpenMesh Decimater, same check  -       13.5      -     1.648   -     11.8
+// In the last row 5,922 of 197,772 collapses broke the bound.
 #include "surfaces/decimate/decimate.h"
 
 #include <fmt/format.h>
@@ -21,18 +33,24 @@ namespace semblance {
 namespace {
 
 // The largest error of a sound collapse, as a share of the square root of the area around it.
+// Larger leaves fewer triangles where the surface is thin or rough, but ruins its shape;
+// docs/implicit.md.
 constexpr double kMostErrorOfSize = 0.15;
-// Keep the merged vertex at the middle of its edge where the surface says little; see MinimumNear.
+// Holds the merged vertex at the middle of its edge in directions in which the quadric is flat. It
+// trades a tiny offset for stability; see MinimumNear.
 constexpr double kDamping = 1e-6;
+// The Newton steps remove that offset.
 constexpr int kNewtonSteps = 3;
-// Refused edges are tried again as long as this share of the triangles went since the last time.
+// Refused edges are tried again as long as this share of the triangles went since the last time. A
+// smaller share costs time for few further collapses.
 constexpr double kLeastGain = 0.005;
-// The share of waiting edges, the cheapest, that may collapse in one sweep.
+// The share of waiting edges, the cheapest, that may collapse in one sweep. A smaller share follows
+// the order of costs more closely but needs more sweeps.
 constexpr double kShareOfSweep = 0.15;
-// Makes short edges go first where the surface is flat.
+// Makes short edges go first where the surface is flat. It is small against any real cost.
 constexpr double kShortFirst = 1e-8;
-// If a smaller share of all edges waits, because the others were refused, no costlier ones are
-// taken: the few that are left would pay for all.
+// If a smaller share of all edges waits, because the others were refused, no costlier edges are
+// taken: otherwise the few edges that can still collapse would have to provide all the collapses.
 constexpr double kLeastWaiting = 0.2;
 using OpenMesh::EdgeHandle;
 using OpenMesh::HalfedgeHandle;
@@ -56,7 +74,7 @@ struct Quadric {
             m.z() * n.z(), e * n.x(),     e * n.y(),     e * n.z(),     e * d};
   }
 
-  // Of the line through p and q, which are apart; the weight is the squared length.
+  // The line through p and q, which are apart; the weight is the squared length.
   static Quadric OfLine(const Vec3& p, const Vec3& q) {
     const Vec3 e = q - p;
     const double l = e.squaredNorm();
@@ -86,8 +104,8 @@ struct Quadric {
     return p.dot(TimesA(p)) - 2 * (x * p.x() + y * p.y() + z * p.z()) + c;
   }
 
-  // The minimum, found by Newton steps from `start`, each damped by a share of A's trace: so
-  // `start` is kept in the directions in which the quadric does not rise.
+  // The minimum, by Newton steps from `start`, each damped by a share of A's trace. So the result
+  // stays at `start` in the directions in which the quadric does not rise.
   Vec3 MinimumNear(const Vec3& start, double damping, int steps) const {
     const double hold = damping * Trace();
     const double a = xx + hold, d = yy + hold, f = zz + hold;
@@ -128,16 +146,16 @@ struct EdgeCost {
   int evaluated = 0;  // the number of collapses by then; -1: the edge has gone
 };
 
-// Where the ends of an edge would merge. Cost NaN: they must not.
+// The place at which the ends of an edge would merge. Cost NaN: they must not merge.
 struct MergeTarget {
   double cost = kNaN;
   Vec3 position = Vec3::Constant(kNaN);
 };
 
-// What is left, in the order that the mesh has.
+// The remaining mesh, in the order of the mesh that was decimated.
 struct Remains {
-  TriMesh mesh;                         // with all points of that mesh
-  std::vector<std::int32_t> triangles;  // of each of its triangles, the index in that mesh
+  TriMesh mesh;                         // with all points of the decimated mesh, used or not
+  std::vector<std::int32_t> triangles;  // per triangle, its index in the decimated mesh
   DecimateSummary summary;
 };
 
@@ -172,7 +190,7 @@ class Decimator {
   DecimateSummary Summary() const;
 
   DecimateOptions options_;
-  Vec3 centre_;  // quadrics are of positions relative to it
+  Vec3 centre_;  // quadrics use positions relative to it, which loses fewer digits
   HalfEdges half_edges_;
   HalfEdgeMesh& edges_;  // of half_edges_
   std::vector<DecimatedVertex> vertices_;
@@ -272,7 +290,7 @@ HalfedgeHandle Decimator::KeptToGone(EdgeHandle edge) const {
   return edges_.is_boundary(h) ? back : h;
 }
 
-// h: as KeptToGone has it.
+// h: from KeptToGone.
 MergeTarget Decimator::TargetOf(HalfedgeHandle h) const {
   if (!h.is_valid()) {
     return {};
@@ -352,8 +370,8 @@ void Decimator::FindWaiting() {
   }
 }
 
-// What the cheapest waiting edges cost: a share of them, but no more than are needed. Infinite: no
-// edge should collapse.
+// The highest cost among the cheapest waiting edges, which are a share of all waiting edges but no
+// more than are needed. Infinite: no edge should collapse.
 float Decimator::CostLimitOfSweep() {
   FindWaiting();
   if (waiting_.empty()) {
@@ -383,7 +401,7 @@ void Decimator::Sweep(float cost_limit) {
   }
 }
 
-// An edge that is refused waits again only once one of its ends has changed.
+// A refused edge waits again only after one of its ends has changed.
 void Decimator::TryCollapse(EdgeHandle edge) {
   costs_[edge.idx()].cost = kNever;
   around_.Gather(edges_, KeptToGone(edge));
@@ -401,8 +419,8 @@ void Decimator::TryCollapse(EdgeHandle edge) {
   }
 }
 
-// The link condition: the ends have no common neighbours but those of their common triangles. Also,
-// triangles are left.
+// Checks the link condition: the ends have no common neighbours except the third corners of their
+// common triangles. Also checks that triangles remain.
 bool Decimator::KeepsTopology() {
   ++attempts_;
   for (const std::int32_t v : around_.ring) {
@@ -433,14 +451,14 @@ void Decimator::SetGeometry(const Vec3& target) {
   geometry_.at_gone = around_.at_gone;
 }
 
-// The original vertices that belong to the triangles around the edge.
+// Collects the original vertices that belong to the triangles around the edge.
 void Decimator::GatherSamples() {
   sampled_.clear();
   for (const std::int32_t t : around_.inner) {
-    originals_.AppendOf(t, sampled_);
+    originals_.AppendVertices(t, sampled_);
   }
   for (const std::int32_t t : around_.outer) {
-    originals_.AppendOf(t, sampled_);
+    originals_.AppendVertices(t, sampled_);
   }
   geometry_.samples.clear();
   for (const std::int32_t v : sampled_) {

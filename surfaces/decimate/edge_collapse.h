@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The collapse of one edge to a point: which triangles it changes, whether they stay well shaped,
-// and how far they move.
+// The collapse of one edge to a point: the triangles that it changes, their quality, and the
+// distance by which they move.
 #pragma once
 
 #include <cstdint>
@@ -37,9 +37,9 @@ struct EdgeNeighbourhood {
 // and becomes (target, ring[i], ring[i + 1]).
 struct CollapseGeometry {
   Vec3 keep, gone, target;     // both ends, and where they merge
-  std::vector<Vec3> opposite;  // the third corners of the one or two triangles at the edge
+  std::vector<Vec3> opposite;  // third corners of the one or two triangles at the edge
   std::vector<Vec3> ring;
-  std::vector<bool> at_gone;  // whether the apex of triangle i was gone
+  std::vector<bool> at_gone;  // true if the apex of triangle i was gone
   bool closed = false, on_border = false;
   std::vector<Vec3> samples;  // points near the triangles
 
@@ -47,25 +47,25 @@ struct CollapseGeometry {
   const Vec3& ApexBefore(std::size_t i) const { return at_gone[i] ? gone : keep; }
 };
 
-// Whether no triangle turns by more than 60 degrees, and none becomes a needle where there was
-// none: the least 4 sqrt(3) area / (sum of squared sides) is at least 0.05, or no less than it was.
-// A triangle without area has no normal of its own and takes that of all.
+// True if no triangle turns by more than 60 degrees and no needle appears: the least 4 sqrt(3) area
+// / (sum of squared sides) of the new triangles is at least 0.05, or no less than that of the old
+// ones. A triangle without area has no normal and takes the mean normal of all.
 bool PreservesQuality(const CollapseGeometry& collapse);
 
 // The sum of the new triangles' area vectors, mm^2.
 Vec3 AreaVectorAfter(const CollapseGeometry& collapse);
 
 struct CollapseError {
-  // No point of either sheet of triangles, before and after, lies further from the other: the
-  // largest difference of height over a common plane, which is where an edge ends or crosses an
-  // edge of the other sheet (Cohen, Manocha & Olano 1997). Where the sheets are no height fields:
-  // how far the ends move.
+  // A bound on the distance between the sheets of triangles before and after. It is their largest
+  // difference in height over a common plane, which occurs where an edge ends or crosses an edge of
+  // the other sheet (Cohen, Manocha & Olano 1997). If the sheets are no height fields, the bound is
+  // the distance by which the ends move.
   double sheets_mm = kNaN;
-  std::vector<int> triangle_of;     // per sample: the new triangle it belongs to
-  std::vector<double> distance_mm;  // per sample: a bound on its distance from that triangle
+  std::vector<int> triangle_of;     // per sample: its new triangle
+  std::vector<double> distance_mm;  // per sample: a bound on the distance from that triangle
 };
 
-// Fills `error`, whose memory is used again.
+// Overwrites `error` and reuses its memory.
 void MeasureCollapse(const CollapseGeometry& collapse, CollapseError& error);
 
 }  // namespace semblance

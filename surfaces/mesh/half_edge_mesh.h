@@ -37,7 +37,7 @@ struct HalfEdges {
 // its original afterwards joins again what was cut.
 HalfEdges MakeHalfEdges(const TriMesh& mesh);
 
-// Whether the faces at the vertex are several fans. OpenMesh keeps such vertices.
+// True if the faces at the vertex form several fans, which OpenMesh accepts.
 bool IsPinched(const HalfEdgeMesh& mesh, OpenMesh::VertexHandle vertex);
 
 // The half-edges of a consistently oriented manifold, without copies. Throws InputError for any

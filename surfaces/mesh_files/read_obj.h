@@ -24,7 +24,7 @@ struct ObjPolygonCorner {
   std::int32_t texture = -1;  // index of a texture coordinate; -1: none
 };
 
-// A face as the file has it, with all its corners.
+// A face of the file with all its corners, repeated ones too.
 struct ObjPolygon {
   std::vector<ObjPolygonCorner> corners;
   std::string material;  // of the last `usemtl`; empty before the first

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What the readers of mesh files share: the lines, words and numbers of a text, limits, and the
+// Shared by the readers of mesh files: the lines, words and numbers of a text, limits, and the
 // precision of coordinates.
 #pragma once
 
