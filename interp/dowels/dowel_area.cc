@@ -9,7 +9,7 @@
 #include <optional>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

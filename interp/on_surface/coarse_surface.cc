@@ -7,7 +7,7 @@
 #include <queue>
 #include <utility>
 
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

@@ -9,7 +9,7 @@
 #include "interp/schemes/simple_schemes.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

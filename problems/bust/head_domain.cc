@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/half_edges.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 namespace {
@@ -24,28 +24,7 @@ constexpr double kRound_mm = 600, kUp_mm = 450;  // about the lengths of u and v
 // edges more of the domain than their size alone would.
 constexpr double kDensity = 0.5, kPower = 0.15;
 
-using Loop = std::vector<std::int32_t>;  // points of a border, with the surface on its left
-
-std::vector<Loop> BorderLoops(const TriMesh& mesh) {
-  std::map<std::int32_t, std::int32_t> next;
-  const HalfEdges edges(mesh, "head");
-  for (HalfEdgeIndex h = 0; h < edges.End(); ++h) {
-    if (edges.IsAlive(h) && edges.Twin(h) < 0) {
-      next[edges.From(h)] = edges.To(h);
-    }
-  }
-  std::vector<Loop> loops;
-  while (!next.empty()) {
-    Loop loop = {next.begin()->first};
-    for (auto at = next.begin(); at != next.end(); at = next.find(loop.back())) {
-      loop.push_back(at->second);
-      next.erase(at);
-    }
-    loop.pop_back();  // the first again
-    loops.push_back(std::move(loop));
-  }
-  return loops;
-}
+using Loop = VertexLoop;  // points of a border, with the surface on its left
 
 double Length(const TriMesh& mesh, const Loop& loop) {
   double sum = 0;
@@ -306,7 +285,7 @@ HeadDomain LayOutHead(const TriMesh& head, const std::string& name) {
   if (ConnectedComponents(head).count != 1) {
     throw InputError(fmt::format("{}: the head is not one piece", name));
   }
-  HeadDomain domain{.mesh = head, .uv = {}, .rims = BorderLoops(head)};
+  HeadDomain domain{.mesh = head, .uv = {}, .rims = BorderLoops(head, "head")};
   if (domain.rims.empty()) {
     throw InputError(fmt::format("{}: the head has no border; it must be open at the neck", name));
   }

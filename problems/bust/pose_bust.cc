@@ -19,7 +19,7 @@
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/correspondences.h"
-#include "surfaces/mesh/outer_surface.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

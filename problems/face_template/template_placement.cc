@@ -19,7 +19,6 @@
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh/mesh_query.h"
-#include "surfaces/mesh/outer_surface.h"
 
 namespace semblance {
 namespace {

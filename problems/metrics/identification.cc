@@ -11,7 +11,7 @@
 #include "problems/metrics/protocols.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
-#include "surfaces/mesh/vertex_clusters.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 namespace {

@@ -20,7 +20,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
-#include "surfaces/mesh/outer_surface.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {

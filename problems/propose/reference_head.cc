@@ -18,8 +18,8 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_check.h"
-#include "surfaces/mesh/outer_surface.h"
-#include "surfaces/mesh/vertex_clusters.h"
+#include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/tri_mesh.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance {

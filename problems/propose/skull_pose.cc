@@ -13,7 +13,7 @@
 #include "fitting/shape_model/shape_model.h"
 #include "problems/propose/skull_pose.h"
 #include "surfaces/base/parallel.h"
-#include "surfaces/mesh/vertex_clusters.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 namespace {

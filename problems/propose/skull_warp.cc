@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "problems/propose/skull_pose.h"
-#include "surfaces/mesh/vertex_clusters.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 namespace {

@@ -22,7 +22,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/lower_case.h"
-#include "surfaces/mesh_files/read_parts.h"
+#include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {
 namespace {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Fewer triangles, the same shape.
+// Decimation: fewer triangles for the same shape.
 #pragma once
 
 #include <array>
@@ -12,14 +12,15 @@
 namespace semblance {
 
 struct DecimateOptions {
-  int target_triangles = 4;  // collapses stop once so few are left; at least 4
-  // No vertex of either mesh lies further from the other than this; > 0. Between its vertices a
-  // mesh may be off by a little more.
+  int target_triangles = 4;  // collapses stop at this number; at least 4
+  // The largest distance of a vertex of either mesh from the other mesh; > 0. Between the vertices
+  // the distance may be a little larger.
   double tolerance_mm = std::numeric_limits<double>::infinity();
 };
 
-// Why it ended. No sound collapse: each further one would turn a triangle by more than 60 degrees,
-// make a needle, change the topology, or move the surface far for the size of its triangles.
+// Why the collapses ended. "No sound collapse": every further collapse would turn a triangle by
+// more than 60 degrees, make a needle, change the topology, or move the surface far compared with
+// the size of its triangles.
 enum class DecimateStop { kNotRun, kTarget, kTolerance, kNoSoundCollapse };
 constexpr auto EnumNames(DecimateStop) {
   return std::to_array<std::string_view>({"not run", "target", "tolerance", "no sound collapse"});
@@ -27,7 +28,7 @@ constexpr auto EnumNames(DecimateStop) {
 
 struct DecimateSummary {
   int triangles = -1;      // in the result
-  double error_mm = kNaN;  // no vertex of the original mesh lies further from the result
+  double error_mm = kNaN;  // an upper bound on the distance of an original vertex from the result
   DecimateStop stop = DecimateStop::kNotRun;
 };
 
@@ -36,13 +37,16 @@ struct DecimateResult {
   DecimateSummary summary;
 };
 
-// Collapses edges, cheapest first. The cost is the squared distance from the planes of the
-// triangles that are there now, weighted by area (Garland & Heckbert 1997; memoryless as in
-// Lindstrom & Turk 1998). Vertices on a border stay on a border. Without a tolerance the vertices
-// that are left then settle among the original ones (original_vertices.h). Components, borders and
-// handles stay. Asked for fewer triangles than sound collapses can give, it leaves more, and the
-// summary says so. Same input, same bytes. Throws InputError if an option is out of range, the mesh
-// is not a consistently oriented manifold or a point is not finite.
+// Collapses edges, the cheapest first. The cost is the squared distance from the planes of the
+// current triangles, weighted by area (Garland & Heckbert 1997; without memory of earlier
+// triangles, as in Lindstrom & Turk 1998). Components, borders and handles are preserved, and
+// border vertices stay on their border. If sound collapses cannot reach the target, more triangles
+// remain and the summary tells why. Without a tolerance the remaining vertices finally settle among
+// the original ones (original_vertices.h). The result does not depend on threads or addresses.
+//
+// The mesh need not be a manifold: it is cut apart as half_edge_mesh.h describes, the vertices at
+// the cuts stay where they are, and the result is joined there again. No triangle is lost. Throws
+// InputError if an option is out of range or a point is not finite.
 DecimateResult Decimate(const TriMesh& mesh, const DecimateOptions& options);
 
 }  // namespace semblance

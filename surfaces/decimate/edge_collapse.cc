@@ -5,60 +5,71 @@
 #include <cmath>
 #include <limits>
 
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {
 
-HalfEdgeIndex FirstOfFan(const HalfEdges& mesh, HalfEdgeIndex h) {
-  while (mesh.Twin(h) >= 0) {
-    h = mesh.TurnRight(h);
+using OpenMesh::HalfedgeHandle;
+
+// The first half-edge of the fan of faces that h belongs to, which starts at a border.
+HalfedgeHandle FirstOfFan(const HalfEdgeMesh& mesh, HalfedgeHandle h) {
+  while (!mesh.is_boundary(mesh.opposite_halfedge_handle(h))) {
+    h = mesh.cw_rotated_halfedge_handle(h);
   }
   return h;
 }
 
 }  // namespace
 
-void EdgeNeighbourhood::AppendFan(const HalfEdges& mesh, HalfEdgeIndex from, HalfEdgeIndex before) {
-  for (HalfEdgeIndex h = from; h >= 0 && h != before; h = mesh.TurnLeft(h)) {
-    spokes.push_back(h);
-    ring.push_back(mesh.To(h));
-    if (mesh.From(h) == gone) {
-      of_gone.push_back(h);
+// Goes counter-clockwise around the start of `from`, up to the half-edge `before` or to a border,
+// whose vertex ends the ring.
+void EdgeNeighbourhood::AppendFan(const HalfEdgeMesh& mesh, HalfedgeHandle from,
+                                  HalfedgeHandle before) {
+  const bool around_gone = mesh.from_vertex_handle(from).idx() == gone;
+  for (HalfedgeHandle h = from; h != before; h = mesh.ccw_rotated_halfedge_handle(h)) {
+    ring.push_back(mesh.to_vertex_handle(h).idx());
+    if (mesh.is_boundary(h)) {
+      return;
     }
+    outer.push_back(mesh.face_handle(h).idx());
+    at_gone.push_back(around_gone);
   }
 }
 
-void EdgeNeighbourhood::Gather(const HalfEdges& mesh, HalfEdgeIndex h) {
-  const bool turn = mesh.IsOnBorder(mesh.To(h)) && !mesh.IsOnBorder(mesh.From(h));
-  edge = turn ? mesh.Twin(h) : h;
-  keep = mesh.From(edge);
-  gone = mesh.To(edge);
-  spokes.clear();
+void EdgeNeighbourhood::Gather(const HalfEdgeMesh& mesh, HalfedgeHandle h) {
+  edge = h;
+  keep = mesh.from_vertex_handle(edge).idx();
+  gone = mesh.to_vertex_handle(edge).idx();
+  inner = {mesh.face_handle(edge).idx()};
+  outer.clear();
+  at_gone.clear();
   ring.clear();
-  of_gone.clear();
-  const HalfEdgeIndex back = mesh.Twin(edge), end = HalfEdges::Next(edge);
-  on_border = back < 0;
-  closed = !mesh.IsOnBorder(keep);
+  const HalfedgeHandle back = mesh.opposite_halfedge_handle(edge),
+                       end = mesh.next_halfedge_handle(edge),
+                       after = mesh.ccw_rotated_halfedge_handle(edge);
+  on_border = mesh.is_boundary(back);
+  closed = !mesh.is_boundary(OpenMesh::VertexHandle(keep));
   if (on_border) {
     AppendFan(mesh, FirstOfFan(mesh, end), end);
   } else {
-    const HalfEdgeIndex first = closed ? mesh.TurnLeft(edge) : FirstOfFan(mesh, edge);
-    AppendFan(mesh, first, HalfEdges::Next(back));
-    AppendFan(mesh, mesh.TurnLeft(back), end);
+    inner.push_back(mesh.face_handle(back).idx());
+    AppendFan(mesh, closed ? after : FirstOfFan(mesh, edge), mesh.next_halfedge_handle(back));
+    AppendFan(mesh, mesh.ccw_rotated_halfedge_handle(back), end);
   }
   if (!closed) {
-    AppendFan(mesh, mesh.TurnLeft(edge), -1);
-    ring.push_back(spokes.empty() ? -1 : mesh.From(HalfEdges::Previous(spokes.back())));
+    AppendFan(mesh, after, HalfedgeHandle());
   }
 }
 
 namespace {
 
+// 60 degrees. A smaller angle preserves the shape better and allows fewer collapses.
 constexpr double kMostTurnCosine = 0.5;
+// The least shape of a new triangle that counts as sound; 1 is equilateral. See PreservesQuality.
 constexpr double kLeastShape = 0.05;
 
-// How close a triangle is to equilateral.
+// Measures how close a triangle is to equilateral.
 struct TriangleShape {
   Vec3 normal;   // not unit
   double sides;  // the sum of their squared lengths, mm^2
@@ -116,10 +127,11 @@ bool PreservesQuality(const CollapseGeometry& collapse) {
 
 namespace {
 
-// Of corners relative to the target: x and y lie in the common plane, z is the height over it.
+// From here on, corners are relative to the target: x and y lie in the common plane, z is the
+// height over it.
 double Cross2(const Vec3& a, const Vec3& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// The weights of a triangle's second and third corner at a point, seen in the plane.
+// The barycentric weights of a triangle's second and third corner at a point, seen in the plane.
 struct PlaneWeights {
   double second = kNaN, third = kNaN;
   double Inside() const { return std::min({second, third, 1 - second - third}); }
@@ -131,9 +143,10 @@ PlaneWeights WeightsOver(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3
   return {Cross2(ap, ac) / area, Cross2(ab, ap) / area};
 }
 
-// As a weight: how far outside a sheet, in the plane, a point still counts as on its rim.
+// Round-off: a point whose least weight is above minus this counts as on the rim of a sheet.
 constexpr double kRim = 1e-9;
-// Steeper triangles do not count as a height field.
+// The least cosine of a triangle's slope in a height field. Heights over steeper triangles would be
+// a poor bound on the distance.
 constexpr double kLeastCosine = 0.1;
 
 // The sheets of triangles before and after the collapse as height fields over one plane.
@@ -141,12 +154,12 @@ class CollapseDistance {
  public:
   explicit CollapseDistance(const CollapseGeometry& collapse);
 
-  // The largest difference of height where both sheets are; NaN unless both are height fields over
-  // the same ring.
+  // The largest difference in height between the sheets; NaN unless both are height fields over the
+  // same ring.
   double Difference() const;
   // The largest 1 / cosine of the slopes.
   double Steepness() const { return 1 / least_cosine_; }
-  // Gives each sample a triangle of the new sheet and its distance from it.
+  // Assigns each sample to a triangle of the new sheet, with the distance from it.
   void AssignSamples(CollapseError& error) const;
 
  private:
@@ -166,7 +179,7 @@ class CollapseDistance {
   double least_cosine_ = 0;  // of the slopes; 0 or less: no height field
 };
 
-// The rows are an orthonormal frame whose last is along `up`.
+// An orthonormal frame as rows; the last row is along `up`.
 Mat3 FrameAlong(const Vec3& up) {
   Mat3 frame;
   frame.row(2) = up.normalized();
@@ -212,8 +225,8 @@ void CollapseDistance::IncludeSlope(const Vec3& a, const Vec3& b, const Vec3& c)
   least_cosine_ = std::min(least_cosine_, n.z() / n.norm());
 }
 
-// All triangles of the new sheet face up, so the ring goes around in one sense; it goes around once
-// if it crosses one ray from the target once.
+// All triangles of the new sheet face up, so the ring always turns the same way around the target.
+// It goes round once if it crosses a ray from the target once.
 bool CollapseDistance::GoesRoundOnce() const {
   int upward = 0;
   for (std::size_t i = 0; i < collapse_.at_gone.size(); ++i) {
@@ -223,8 +236,8 @@ bool CollapseDistance::GoesRoundOnce() const {
   return upward <= 1;
 }
 
-// The height of an end of the edge over the new sheet. NaN: outside, which happens only at a
-// border.
+// The height of an end of the edge over the new sheet. NaN if the end is outside, which happens
+// only at a border.
 double CollapseDistance::AtEnd(const Vec3& end) const {
   double most_inside = -kRim, difference = kNaN;
   for (std::size_t i = 0; i < collapse_.at_gone.size(); ++i) {
@@ -295,7 +308,7 @@ double CollapseDistance::Difference() const {
   return most;
 }
 
-// The triangle of the new sheet in whose sector around the target p lies; -1 if none.
+// The triangle of the new sheet whose sector around the target contains p; -1 if none does.
 int CollapseDistance::SectorOf(const Vec3& p) const {
   double from = Cross2(ring_[0], p);
   for (std::size_t i = 0; i < collapse_.at_gone.size(); ++i) {
@@ -347,8 +360,8 @@ double DistanceToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return (p - a - t * (b - a)).norm();
 }
 
-// How far the border itself moves: before, it runs from the ring's end over keep and gone to the
-// ring's start; after, over the target.
+// The distance by which the border itself moves. Before the collapse it runs from the ring's end
+// over keep and gone to the ring's start; afterwards it runs over the target.
 double BorderDistance(const CollapseGeometry& collapse) {
   return std::max({DistanceToSegment(collapse.keep, collapse.ring.back(), collapse.target),
                    DistanceToSegment(collapse.gone, collapse.target, collapse.ring.front()),

@@ -1,43 +1,45 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The collapse of one edge to a point: which triangles it changes, whether they stay well shaped,
-// and how far they move.
+// The collapse of one edge to a point: the triangles that it changes, their quality, and the
+// distance by which they move.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "surfaces/base/geometry.h"
-#include "surfaces/mesh/half_edges.h"
+#include "surfaces/mesh/half_edge_mesh.h"
 
 namespace semblance {
 
 // The triangles around an edge from `keep` to `gone`. Outer triangle i is (apex, ring[i],
-// ring[i + 1]), its apex keep or gone; after the collapse its apex is the merged vertex. The one or
-// two triangles at the edge itself disappear.
+// ring[i + 1]); its apex is keep or gone, and after the collapse the merged vertex. The one or two
+// triangles at the edge itself disappear. All vertices are indices in the half-edge mesh.
 struct EdgeNeighbourhood {
   std::int32_t keep = -1, gone = -1;
-  HalfEdgeIndex edge = -1;             // from keep to gone
-  std::vector<HalfEdgeIndex> spokes;   // of the outer triangles: from the apex to ring[i]
-  std::vector<HalfEdgeIndex> of_gone;  // the spokes that leave `gone`
-  std::vector<std::int32_t> ring;
-  bool closed = false;     // neither end is on a border: the last of the ring meets the first
-  bool on_border = false;  // the edge itself is
+  OpenMesh::HalfedgeHandle edge;    // from keep to gone; it has a face
+  std::vector<std::int32_t> inner;  // the faces of the triangles at the edge
+  std::vector<std::int32_t> outer;  // the faces of the outer triangles
+  std::vector<bool> at_gone;        // per outer triangle: whether its apex is gone
+  std::vector<std::int32_t> ring;   // counter-clockwise
+  bool closed = false;     // keep is not on a border: the ring's last vertex meets its first
+  bool on_border = false;  // the edge itself is on a border
 
-  // h: an edge that is on the border if both its ends are. If one end is on the border, that end is
-  // kept.
-  void Gather(const HalfEdges& mesh, HalfEdgeIndex h);
+  // h: a half-edge from keep to gone. If gone is on a border, keep is too and so is the edge; then
+  // h has a face.
+  void Gather(const HalfEdgeMesh& mesh, OpenMesh::HalfedgeHandle h);
 
  private:
-  void AppendFan(const HalfEdges& mesh, HalfEdgeIndex from, HalfEdgeIndex before);
+  void AppendFan(const HalfEdgeMesh& mesh, OpenMesh::HalfedgeHandle from,
+                 OpenMesh::HalfedgeHandle before);
 };
 
 // The positions of an EdgeNeighbourhood, in mm: triangle i was (keep or gone, ring[i], ring[i + 1])
 // and becomes (target, ring[i], ring[i + 1]).
 struct CollapseGeometry {
   Vec3 keep, gone, target;     // both ends, and where they merge
-  std::vector<Vec3> opposite;  // the third corners of the one or two triangles at the edge
+  std::vector<Vec3> opposite;  // third corners of the one or two triangles at the edge
   std::vector<Vec3> ring;
-  std::vector<bool> at_gone;  // whether the apex of triangle i was gone
+  std::vector<bool> at_gone;  // true if the apex of triangle i was gone
   bool closed = false, on_border = false;
   std::vector<Vec3> samples;  // points near the triangles
 
@@ -45,25 +47,25 @@ struct CollapseGeometry {
   const Vec3& ApexBefore(std::size_t i) const { return at_gone[i] ? gone : keep; }
 };
 
-// Whether no triangle turns by more than 60 degrees, and none becomes a needle where there was
-// none: the least 4 sqrt(3) area / (sum of squared sides) is at least 0.05, or no less than it was.
-// A triangle without area has no normal of its own and takes that of all.
+// True if no triangle turns by more than 60 degrees and no needle appears: the least 4 sqrt(3) area
+// / (sum of squared sides) of the new triangles is at least 0.05, or no less than that of the old
+// ones. A triangle without area has no normal and takes the mean normal of all.
 bool PreservesQuality(const CollapseGeometry& collapse);
 
 // The sum of the new triangles' area vectors, mm^2.
 Vec3 AreaVectorAfter(const CollapseGeometry& collapse);
 
 struct CollapseError {
-  // No point of either sheet of triangles, before and after, lies further from the other: the
-  // largest difference of height over a common plane, which is where an edge ends or crosses an
-  // edge of the other sheet (Cohen, Manocha & Olano 1997). Where the sheets are no height fields:
-  // how far the ends move.
+  // A bound on the distance between the sheets of triangles before and after. It is their largest
+  // difference in height over a common plane, which occurs where an edge ends or crosses an edge of
+  // the other sheet (Cohen, Manocha & Olano 1997). If the sheets are no height fields, the bound is
+  // the distance by which the ends move.
   double sheets_mm = kNaN;
-  std::vector<int> triangle_of;     // per sample: the new triangle it belongs to
-  std::vector<double> distance_mm;  // per sample: a bound on its distance from that triangle
+  std::vector<int> triangle_of;     // per sample: its new triangle
+  std::vector<double> distance_mm;  // per sample: a bound on the distance from that triangle
 };
 
-// Fills `error`, whose memory is used again.
+// Overwrites `error` and reuses its memory.
 void MeasureCollapse(const CollapseGeometry& collapse, CollapseError& error);
 
 }  // namespace semblance

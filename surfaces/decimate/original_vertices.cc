@@ -6,19 +6,23 @@
 #include <limits>
 #include <numeric>
 
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance {
 namespace {
 
+// More rounds gain little: two lower the RMS by an eighth and more (docs/implicit.md).
 constexpr int kSettleRounds = 2;
-constexpr double kSettleShare = 0.5;  // of a step, for neighbours move at once
+// The share of a step that is taken. Neighbours move in the same round, so a whole step would
+// overshoot.
+constexpr double kSettleShare = 0.5;
 // Holds a point in directions in which no triangle faces.
 constexpr double kSettleDamping = 0.01;
-constexpr double kMostTurnCosine = 0.5;
+constexpr double kMostTurnCosine = 0.5;  // 60 degrees, as in a collapse
 
-// What draws a point. With n a triangle's normal, h the height of an original vertex over its plane
-// and w the point's weight at the vertex's foot: the normal equations of sum (h - w n . step)^2.
+// The pull of the original vertices on a point, as the normal equations of sum (h - w n . step)^2.
+// Here n is a triangle's normal, h the height of an original vertex over its plane, and w the
+// point's weight at the foot of the vertex.
 struct Pull {
   double xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;  // sum w^2 n n'
   Vec3 right = Vec3::Zero();                              // sum w h n
@@ -45,8 +49,8 @@ struct Pull {
   }
 };
 
-// Of the original vertices `drawing`, on the corners t of their triangle.
-void AddPulls(const TriMesh& original, const std::vector<std::int32_t>& drawing, const Triangle& t,
+// Adds the pulls of the original vertices `pulling` on the corners t of their triangle.
+void AddPulls(const TriMesh& original, const std::vector<std::int32_t>& pulling, const Triangle& t,
               const std::vector<Vec3>& points, std::vector<Pull>& pulls) {
   const Vec3 &a = points[t[0]], ab = points[t[1]] - a, ac = points[t[2]] - a, m = ab.cross(ac);
   const double square = m.squaredNorm();
@@ -54,7 +58,7 @@ void AddPulls(const TriMesh& original, const std::vector<std::int32_t>& drawing,
     return;
   }
   const Vec3 n = m / std::sqrt(square), to_b = ac.cross(m) / square, to_c = m.cross(ab) / square;
-  for (const std::int32_t v : drawing) {
+  for (const std::int32_t v : pulling) {
     const Vec3 ap = original.points[v] - a;
     const double b = std::clamp(to_b.dot(ap), 0.0, 1.0), c = std::clamp(to_c.dot(ap), 0.0, 1 - b);
     const double height_mm = n.dot(ap);
@@ -68,8 +72,8 @@ bool TurnsFar(const Vec3& before, const Vec3& after) {
   return before.dot(after) < kMostTurnCosine * before.norm() * after.norm();
 }
 
-// Puts points back until no triangle turns far.
-void PutBack(const std::vector<Vec3>& before, TriMesh& mesh) {
+// Moves points back until no triangle turns far.
+void UndoFarTurns(const std::vector<Vec3>& before, TriMesh& mesh) {
   const TriMesh was{before, {}};
   for (bool more = true; more;) {
     more = false;
@@ -111,7 +115,8 @@ OriginalVertices::OriginalVertices(const TriMesh& mesh)
   }
 }
 
-void OriginalVertices::AppendOf(std::int32_t triangle, std::vector<std::int32_t>& vertices) const {
+void OriginalVertices::AppendVertices(std::int32_t triangle,
+                                      std::vector<std::int32_t>& vertices) const {
   for (std::int32_t v = first_[triangle]; v >= 0; v = next_[v]) {
     vertices.push_back(v);
   }
@@ -151,13 +156,13 @@ double OriginalVertices::DistanceBound_mm(const Vec3& p,
 
 void OriginalVertices::Settle(const std::vector<std::int32_t>& triangles,
                               const std::function<bool(std::int32_t)>& is_fixed, TriMesh& left) {
-  std::vector<std::int32_t> drawing;
+  std::vector<std::int32_t> pulling;
   for (int round = 0; round < kSettleRounds; ++round) {
     std::vector<Pull> pulls(left.points.size());
     for (std::size_t n = 0; n < triangles.size(); ++n) {
-      drawing.clear();
-      AppendOf(triangles[n], drawing);
-      AddPulls(mesh_, drawing, left.triangles[n], left.points, pulls);
+      pulling.clear();
+      AppendVertices(triangles[n], pulling);
+      AddPulls(mesh_, pulling, left.triangles[n], left.points, pulls);
     }
     const std::vector<Vec3> before = left.points;
     for (std::int32_t v = 0; v < static_cast<std::int32_t>(before.size()); ++v) {
@@ -165,13 +170,13 @@ void OriginalVertices::Settle(const std::vector<std::int32_t>& triangles,
         left.points[v] += pulls[v].Step();
       }
     }
-    PutBack(before, left);
+    UndoFarTurns(before, left);
   }
-  TakeDistances(triangles, left);
+  UpdateDistances(triangles, left);
 }
 
-void OriginalVertices::TakeDistances(const std::vector<std::int32_t>& triangles,
-                                     const TriMesh& left) {
+void OriginalVertices::UpdateDistances(const std::vector<std::int32_t>& triangles,
+                                       const TriMesh& left) {
   for (std::size_t n = 0; n < triangles.size(); ++n) {
     const Triangle& t = left.triangles[n];
     const Vec3 &a = left.points[t[0]], &b = left.points[t[1]], &c = left.points[t[2]];

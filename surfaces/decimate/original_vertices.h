@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The vertices of the original mesh, carried along while it is decimated: each belongs to one
-// triangle of the mesh that is left, and in the end draws it to itself.
+// The vertices of the original mesh, carried along while it is decimated. Each vertex belongs to
+// one remaining triangle, and finally pulls that triangle towards itself.
 #pragma once
 
 #include <cstdint>
@@ -12,14 +12,14 @@
 
 namespace semblance {
 
-// Keeps a reference to the original mesh; the triangles that are left keep their indices.
+// Keeps a reference to the original mesh. The remaining triangles keep their original indices.
 class OriginalVertices {
  public:
   explicit OriginalVertices(const TriMesh& mesh);
 
   const Vec3& Position(std::int32_t vertex) const { return mesh_.points[vertex]; }
   // Appends the vertices that belong to the triangle.
-  void AppendOf(std::int32_t triangle, std::vector<std::int32_t>& vertices) const;
+  void AppendVertices(std::int32_t triangle, std::vector<std::int32_t>& vertices) const;
   void Clear(std::int32_t triangle) { first_[triangle] = -1; }
   void Assign(std::int32_t triangle, std::int32_t vertex, double distance_mm);
 
@@ -30,17 +30,17 @@ class OriginalVertices {
   // triangles at the nearest of the given vertices. Infinite if no vertices are given.
   double DistanceBound_mm(const Vec3& p, const std::vector<std::int32_t>& vertices) const;
 
-  // Moves the points of what is left of the mesh towards the least sum of squared distances of the
-  // original vertices from the planes of their triangles: two half steps of Gauss and Newton, in
-  // which a point goes no further than what belongs to its triangles is off. A point whose move
-  // would turn a triangle by more than 60 degrees stays, and so does a fixed one. Then takes the
-  // distances anew.
-  //   triangles: the indices of those that are left; left: they, in this order, and all points.
+  // Moves the points of the remaining mesh towards the least sum of squared distances of the
+  // original vertices from the planes of their triangles: two half steps of Gauss-Newton, none
+  // longer than the largest distance that pulls the point. A point whose step would turn a triangle
+  // by more than 60 degrees stays, and so does a fixed point. Recomputes the distances afterwards.
+  //   triangles: the indices of the remaining triangles
+  //   left: these triangles, in this order, and all points
   void Settle(const std::vector<std::int32_t>& triangles,
               const std::function<bool(std::int32_t)>& is_fixed, TriMesh& left);
 
  private:
-  void TakeDistances(const std::vector<std::int32_t>& triangles, const TriMesh& left);
+  void UpdateDistances(const std::vector<std::int32_t>& triangles, const TriMesh& left);
 
   const TriMesh& mesh_;
   std::vector<std::int32_t> first_, next_;  // a linked list per triangle; -1 ends it

@@ -36,7 +36,7 @@ double LidArea_mm2(const CutPlane& plane, const TriMesh& mesh) {
   return area;
 }
 
-// Of the six sides of the bounding box.
+// Returns those of the six sides of the bounding box that `accept` accepts.
 template <class Accept>
 std::vector<CutPlane> SidesWhere(const TriMesh& mesh, const Accept& accept) {
   const Box3 box = Bounds(mesh);

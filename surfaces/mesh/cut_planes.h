@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where a scan ends: beyond these planes nothing is known of a skull.
+// Planes at which a scan ends. Beyond them nothing is known about a skull.
 #pragma once
 
 #include <span>
@@ -24,15 +24,15 @@ struct CutPlane {
 std::vector<CutPlane> FindCutPlanes(const TriMesh& skull);
 
 // A side of the bounding box is also the end of a scan if a lid lies in it: triangles that face
-// that way within 10 degrees and lie within 0.5 mm of it, 5 cm^2 or more in all. (A ball of 80 mm
-// has half of that at its top.)
+// that way within 10 degrees and lie within 0.5 mm of it, with an area of 5 cm^2 or more. (The top
+// of a ball of 80 mm has half of that.)
 std::vector<CutPlane> FindLids(const TriMesh& mesh);
 
-// In words, e.g. "z = 0.0 mm (lower end)".
+// For messages, e.g. "z = 0.0 mm (lower end)".
 std::string InWords(const CutPlane& plane);
 
-// The triangles of a face that lie on the skull's side of all planes, at least margin_mm from each:
-// what a scan has to say about it.
+// The part of a face for which the scan has bone: the triangles on the skull's side of all planes,
+// at least margin_mm from each.
 TriMesh WithinScan(const TriMesh& face, std::span<const CutPlane> planes, double margin_mm);
 
 }  // namespace semblance

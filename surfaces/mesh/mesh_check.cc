@@ -13,9 +13,10 @@
 namespace semblance {
 namespace {
 
-// The unit in which a size is nearest to that of a head, and what is to be done; else to check it.
+// The unit in which the size is nearest to that of a head, with the remedy; otherwise the advice to
+// check the unit.
 std::string UnitGuess(double size, const std::string& remedy) {
-  constexpr double kUsual_mm = 230;  // of a skull or a head
+  constexpr double kUsual_mm = 230;  // longest side of a skull or a head
   std::string guess = "check its unit";
   double least = std::numeric_limits<double>::infinity();
   for (const auto& [unit, factor] : {std::pair("metres", 1000.0), std::pair("centimetres", 10.0),
@@ -29,7 +30,7 @@ std::string UnitGuess(double size, const std::string& remedy) {
   return guess;
 }
 
-// Beyond this, numbers of a file's single precision lie more than 0.01 mm apart.
+// Beyond this distance the steps of single precision, which most files have, exceed 0.01 mm.
 constexpr double kFarthest_mm = 1e5;
 
 void CheckPlace(const TriMesh& mesh, const std::string& name) {

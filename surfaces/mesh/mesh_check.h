@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Whether a mesh can be a head in millimetres, and what is wrong with it.
+// Checks whether a mesh can be a head in millimetres, and names its defects.
 #pragma once
 
 #include <string>
@@ -9,20 +9,19 @@
 
 namespace semblance {
 
-// A head, or the scanned part of one, is of this size.
+// The range of the longest side of a head, or of the scanned part of one.
 inline constexpr double kSmallestHead_mm = 60, kLargestHead_mm = 500;
 
-// Throws InputError, naming the thing, unless its longest side is that of a head in mm. If it looks
-// like a head in another unit, the message names the unit and ends with `remedy`, in which {} is
-// the factor to mm.
+// Throws InputError with the name of the mesh unless its longest side is that of a head in mm. If
+// the size suggests another unit, the message names the unit and ends with `remedy`, in which {}
+// stands for the factor to mm.
 void CheckHeadSize(double longest_mm, const std::string& name, const std::string& remedy);
 
-// Throws InputError, naming the mesh, if it is empty or not finite, if its bounding box is not
-// that of a head in mm (saying which unit it looks like), if it lies more than 100 m from the
-// origin, if it has no area, or if it is inside out: of rays sent from
-// far outside, most hit a triangle's back first. The mesh is never turned silently. Returns a line
-// for each lesser defect that real scans have: non-manifold, inconsistent or open edges, triangles
-// without area.
+// Throws InputError with the name of the mesh if the mesh is empty, has no area, is not finite,
+// lies more than 100 m from the origin, or is inside out, and if its longest side is not that of a
+// head in mm (the message guesses the unit). Inside out means that most rays from far outside hit
+// the back of a triangle first; the mesh is never turned silently. Returns one line for each lesser
+// defect of real scans: open, non-manifold or inconsistent edges.
 std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& name);
 
 }  // namespace semblance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Meshes whose vertices stand in memory as they do on the surface.
+// Reorders a mesh so that neighbours on the surface are near each other in memory.
 #pragma once
 
 #include <cstdint>
@@ -9,21 +9,23 @@
 
 namespace semblance {
 
-// Whether neighbours are far apart in memory, so that work along the surface would wait for it: in
-// a surface that is stored row by row a row lies between them.
+// True if neighbours are so far apart in memory that work along the surface would wait for it. In a
+// surface that is stored row by row, neighbours are at most a row apart.
 bool IsScattered(const TriMesh& mesh);
 
-// A mesh with its vertices and triangles in another order, and the indices that they had.
+// A reordered mesh, and the former indices of its vertices and triangles.
 struct OrderedMesh {
   TriMesh mesh;
   std::vector<std::int32_t> vertices, triangles;
 };
 
-// Breadth first over the surface: an order that does not depend on how the mesh lies in space.
+// Orders the mesh breadth first over the surface. The order does not depend on the position of the
+// mesh in space.
 OrderedMesh InOrderOfNeighbours(const TriMesh& mesh);
 
-// Gives a part of `ordered` the order of the mesh that it was made of. part: all points, moved or
-// not, and some triangles, whose corners may be others; triangles: their indices in `ordered`.
+// Restores the former order of a part of `ordered`.
+//   part: all points, moved or not, and some triangles, whose corners may have changed
+//   triangles: the indices in `ordered` of the triangles of the part
 void PutBackInOrder(const OrderedMesh& ordered, const std::vector<std::int32_t>& triangles,
                     TriMesh& part);
 

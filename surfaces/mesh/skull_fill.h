@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The outer shell of a skull, with temples, orbits and the gap to the mandible bridged: what emits
-// (thesis 3.3, fig. 3.5; there by hand).
+// The outer shell of a skull, whose triangles emit. It bridges the temples, the orbits and the gap
+// to the mandible (thesis 3.3, fig. 3.5, where this is done by hand).
 #pragma once
 
 #include <string_view>
@@ -14,10 +14,10 @@ namespace semblance {
 
 struct WrapFill {
   static constexpr std::string_view kName = "wrap";
-  double alpha_mm = 24;  // narrower openings are bridged
-  double edge_mm = 3.5;  // of the shell's triangles
-  double pull_mm = 4;    // closer parts are laid onto bone
-  double press_mm = 3;   // a dowel reaches out at least so far
+  double alpha_mm = 24;
+  double edge_mm = 3.5;
+  double pull_mm = 4;
+  double press_mm = 3;
 };
 template <class Visitor>
 void Fields(Visitor& visit, WrapFill& o) {
@@ -59,8 +59,13 @@ void Fields(Visitor&, NoFill&) {}
 
 using SkullFill = std::variant<WrapFill, NoFill>;
 
-// The shell: with `wrap` closed, manifold and outward (alpha wrapping: Portaneri et al. 2022); with
-// `none` the skull itself.
+// The shell of a skull. With `wrap` it is a closed, outward manifold (alpha wrapping: Portaneri et
+// al. 2022); with `none` it is the skull itself.
 TriMesh FillSkull(const TriMesh& skull, const SkullFill& fill, const RunContext& context);
+
+// The same surface with triangles whose edges are near edge_mm (Botsch & Kobbelt 2004); the result
+// is a manifold. Throws InputError if edge_mm is not positive or the mesh is not a consistently
+// oriented manifold.
+TriMesh Remesh(const TriMesh& mesh, double edge_mm);
 
 }  // namespace semblance

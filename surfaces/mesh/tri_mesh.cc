@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surfaces/mesh/tri_mesh.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <utility>
+
+#include "surfaces/base/error.h"
+#include "surfaces/mesh/half_edge_mesh.h"
 
 namespace semblance {
 namespace {
@@ -16,26 +23,49 @@ int Root(std::vector<int>& parent, int i) {
   return i;
 }
 
-// An edge as seen from one triangle: the sorted pair of points, and whether the triangle runs from
-// the lower to the higher.
-struct HalfEdge {
+// A side of a triangle: its sorted pair of points, and whether the triangle runs from the lower
+// point to the higher.
+struct TriangleSide {
   std::int32_t low, high;
   bool forward;
   auto Key() const { return std::pair(low, high); }
 };
 
-std::vector<HalfEdge> SortedHalfEdges(const TriMesh& mesh) {
-  std::vector<HalfEdge> half_edges;
-  half_edges.reserve(3 * mesh.triangles.size());
+// Calls visit(first, last) for the sides at each edge, in the order of the edges. Unlike
+// half-edges, sorted sides show all triangles of a non-manifold edge.
+template <class Visit>
+void ForEachEdge(const TriMesh& mesh, const Visit& visit) {
+  std::vector<TriangleSide> sides;
+  sides.reserve(3 * mesh.triangles.size());
   for (const Triangle& t : mesh.triangles) {
     for (int c = 0; c < 3; ++c) {
       const std::int32_t a = t[c], b = t[(c + 1) % 3];
-      half_edges.push_back({std::min(a, b), std::max(a, b), a < b});
+      sides.push_back({std::min(a, b), std::max(a, b), a < b});
     }
   }
-  std::sort(half_edges.begin(), half_edges.end(),
-            [](const HalfEdge& a, const HalfEdge& b) { return a.Key() < b.Key(); });
-  return half_edges;
+  std::ranges::sort(sides, {}, &TriangleSide::Key);
+  for (auto first = sides.cbegin(); first != sides.cend();) {
+    const auto last = std::find_if(
+        first, sides.cend(), [&](const TriangleSide& side) { return side.Key() != first->Key(); });
+    visit(first, last);
+    first = last;
+  }
+}
+
+using FacedCell = std::array<std::int64_t, 4>;  // the cell of the grid, and the side that is faced
+
+std::int64_t FacedSide(const Vec3& normal) {
+  Eigen::Index axis = 0;
+  normal.cwiseAbs().maxCoeff(&axis);
+  return 2 * axis + (normal[axis] < 0 ? 1 : 0);
+}
+
+FacedCell FindFacedCell(const Vec3& p, const Vec3& normal, double cell_mm) {
+  if (!p.allFinite()) {
+    throw InputError("cluster vertices: a point is not finite; repair the mesh first");
+  }
+  const auto index = [&](double x) { return static_cast<std::int64_t>(std::floor(x / cell_mm)); };
+  return {index(p.x()), index(p.y()), index(p.z()), FacedSide(normal)};
 }
 
 }  // namespace
@@ -112,43 +142,64 @@ Components ConnectedComponents(const TriMesh& mesh) {
 }
 
 EdgeReport CheckEdges(const TriMesh& mesh) {
-  const std::vector<HalfEdge> half_edges = SortedHalfEdges(mesh);
   EdgeReport report;
-  for (std::size_t begin = 0, end = 0; begin < half_edges.size(); begin = end) {
-    while (end < half_edges.size() && half_edges[end].Key() == half_edges[begin].Key()) {
-      ++end;
-    }
+  ForEachEdge(mesh, [&](auto first, auto last) {
     ++report.edges;
-    report.boundary += end - begin == 1;
-    report.non_manifold += end - begin > 2;
-    report.inconsistent +=
-        end - begin == 2 && half_edges[begin].forward == half_edges[begin + 1].forward;
-  }
+    report.boundary += last - first == 1;
+    report.non_manifold += last - first > 2;
+    report.inconsistent += last - first == 2 && first->forward == first[1].forward;
+  });
   return report;
 }
 
 std::vector<MeshEdge> BorderEdges(const TriMesh& mesh) {
-  std::vector<MeshEdge> edges;
-  edges.reserve(3 * mesh.triangles.size());
-  for (const Triangle& t : mesh.triangles) {
-    for (int c = 0; c < 3; ++c) {
-      edges.push_back({std::min(t[c], t[(c + 1) % 3]), std::max(t[c], t[(c + 1) % 3])});
-    }
-  }
-  std::sort(edges.begin(), edges.end());
   std::vector<MeshEdge> border;
-  for (auto first = edges.begin(); first != edges.end();) {
-    const auto last = std::upper_bound(first, edges.end(), *first);
+  ForEachEdge(mesh, [&](auto first, auto last) {
     if (last - first == 1) {
-      border.push_back(*first);
+      border.push_back({first->low, first->high});
     }
-    first = last;
-  }
+  });
   return border;
 }
 
+std::vector<VertexLoop> BorderLoops(const TriMesh& mesh, const char* caller) {
+  const HalfEdgeMesh half_edges = MakeManifold(mesh, caller);
+  std::vector<VertexLoop> loops;
+  std::vector<bool> visited(mesh.points.size(), false);
+  for (const OpenMesh::VertexHandle start : half_edges.vertices()) {
+    if (visited[start.idx()] || half_edges.is_isolated(start) || !half_edges.is_boundary(start)) {
+      continue;
+    }
+    VertexLoop& loop = loops.emplace_back();
+    // The half-edge of a border vertex runs along the border with the surface on its right, so the
+    // loop goes backwards.
+    for (OpenMesh::VertexHandle v = start; !visited[v.idx()];
+         v = half_edges.from_vertex_handle(
+             half_edges.prev_halfedge_handle(half_edges.halfedge_handle(v)))) {
+      visited[v.idx()] = true;
+      loop.push_back(v.idx());
+    }
+  }
+  return loops;
+}
+
+std::vector<VertexLoop> VertexRings(const TriMesh& mesh, const char* caller) {
+  const HalfEdgeMesh half_edges = MakeManifold(mesh, caller);
+  std::vector<VertexLoop> rings;
+  for (const OpenMesh::VertexHandle v : half_edges.vertices()) {
+    VertexLoop& ring = rings.emplace_back();
+    for (const OpenMesh::VertexHandle neighbour : half_edges.vv_ccw_range(v)) {
+      ring.push_back(neighbour.idx());
+    }
+    if (!ring.empty() && half_edges.is_boundary(v)) {  // OpenMesh starts at the last neighbour
+      std::rotate(ring.begin(), ring.begin() + 1, ring.end());
+    }
+  }
+  return rings;
+}
+
 std::vector<std::int32_t> DropUnusedPoints(TriMesh& mesh) {
-  std::vector<std::int32_t> renumbered(mesh.points.size(), -1), left;
+  std::vector<std::int32_t> renumbered(mesh.points.size(), -1), former;
   for (const Triangle& t : mesh.triangles) {
     for (const std::int32_t v : t) {
       renumbered[v] = 0;
@@ -156,16 +207,16 @@ std::vector<std::int32_t> DropUnusedPoints(TriMesh& mesh) {
   }
   for (std::size_t v = 0; v < mesh.points.size(); ++v) {
     if (renumbered[v] == 0) {
-      renumbered[v] = static_cast<std::int32_t>(left.size());
-      mesh.points[left.size()] = mesh.points[v];
-      left.push_back(static_cast<std::int32_t>(v));
+      renumbered[v] = static_cast<std::int32_t>(former.size());
+      mesh.points[former.size()] = mesh.points[v];
+      former.push_back(static_cast<std::int32_t>(v));
     }
   }
-  mesh.points.resize(left.size());
+  mesh.points.resize(former.size());
   for (Triangle& t : mesh.triangles) {
     t = {renumbered[t[0]], renumbered[t[1]], renumbered[t[2]]};
   }
-  return left;
+  return former;
 }
 
 TriMesh Submesh(const TriMesh& mesh, const std::vector<bool>& keep) {
@@ -177,6 +228,39 @@ TriMesh Submesh(const TriMesh& mesh, const std::vector<bool>& keep) {
   }
   DropUnusedPoints(result);
   return result;
+}
+
+TriMesh ClusterVertices(const TriMesh& mesh, double cell_mm) {
+  if (!(cell_mm > 0)) {
+    throw InputError(fmt::format("cluster vertices: cell_mm is {}; it must be positive", cell_mm));
+  }
+  const std::vector<Vec3> normals = VertexNormals(mesh);
+  std::map<FacedCell, std::int32_t> clusters;  // numbered in the order of their first vertices
+  std::vector<std::int32_t> cluster_of(mesh.points.size());
+  TriMesh coarse;
+  std::vector<double> members;
+  for (std::size_t v = 0; v < mesh.points.size(); ++v) {
+    const auto [it, is_new] =
+        clusters.try_emplace(FindFacedCell(mesh.points[v], normals[v], cell_mm),
+                             static_cast<std::int32_t>(clusters.size()));
+    if (is_new) {
+      coarse.points.emplace_back(Vec3::Zero());
+      members.push_back(0);
+    }
+    cluster_of[v] = it->second;
+    coarse.points[it->second] += mesh.points[v];
+    members[it->second] += 1;
+  }
+  for (std::size_t c = 0; c < members.size(); ++c) {
+    coarse.points[c] /= members[c];
+  }
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Triangle t = {cluster_of[a], cluster_of[b], cluster_of[c]};
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) {
+      coarse.triangles.push_back(t);
+    }
+  }
+  return coarse;
 }
 
 TriMesh Transformed(const TriMesh& mesh, const Similarity& to_from) {

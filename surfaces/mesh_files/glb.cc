@@ -21,10 +21,10 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kFloat = 5126, kUnsigned = 5125, kShort = 5123, kVertices = 34962, kIndices = 34963;
 
-// From LPS to glTF's axes: +z up becomes +y up, the face looks along +z.
+// Converts LPS to the axes of glTF: +z up becomes +y up, and the face looks along +z.
 Eigen::Vector3f ToGltf(const Vec3& v) { return Vec3(v.x(), v.z(), -v.y()).cast<float>(); }
 
-// glTF's numbers are little-endian whatever the machine.
+// The numbers of glTF are little-endian on every machine.
 template <class Integer>
 void Append(std::string& bytes, Integer value) {
   for (std::size_t k = 0; k < sizeof(Integer); ++k) {
@@ -40,7 +40,7 @@ void AppendVector(std::string& bytes, const Eigen::Vector3f& v) {
   }
 }
 
-// A colour of 8 bits per channel has 16 where light adds up linearly.
+// A channel of 8 bits needs 16 bits in linear light, or dark colours would lose steps.
 std::uint16_t LinearShort(std::uint8_t srgb) {
   return static_cast<std::uint16_t>(std::lround(65535 * LinearFromSrgb(srgb / 255.0)));
 }

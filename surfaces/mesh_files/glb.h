@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Meshes as binary glTF 2.0, for viewers of all kinds.
+// Writes meshes as binary glTF 2.0, which most viewers open.
 #pragma once
 
 #include <array>
@@ -15,18 +15,18 @@ namespace semblance {
 
 struct GlbMaterial {
   std::string name;
-  std::array<double, 3> colour = {0.8, 0.8, 0.8};  // sRGB, 0..1; not used under a texture
+  std::array<double, 3> colour = {0.8, 0.8, 0.8};  // sRGB, 0..1; ignored if there is a texture
   double roughness = 0.8;                          // 0..1
   std::string texture = {};                        // bytes of a PNG or JPEG; empty: none
 };
 
-// Triangles of one material.
+// The triangles of one material.
 struct GlbPart {
   GlbMaterial material;
-  std::vector<Vec3> points, normals;                      // mm, LPS; one normal per point
-  std::vector<Vec2> uv = {};                              // one per point, v upwards, or none
-  std::vector<std::array<std::uint8_t, 3>> colours = {};  // sRGB, one per point, or none: each is
-                                                          // multiplied with the material's
+  std::vector<Vec3> points, normals;  // mm, LPS; one normal per point
+  std::vector<Vec2> uv = {};          // one per point, v upwards, or none
+  // sRGB, one per point, or none. Viewers multiply them with the colour of the material.
+  std::vector<std::array<std::uint8_t, 3>> colours = {};
   std::vector<Triangle> triangles;
 };
 
@@ -36,14 +36,14 @@ struct GlbNode {
   std::vector<GlbNode> children = {};
 };
 
-// Whether a texture may be these bytes: by its first ones, a PNG or JPEG.
+// True if the bytes can be a texture: the first ones are those of a PNG or a JPEG.
 bool IsGlbPicture(std::string_view bytes);
 
-// One scene of these nodes: in metres, +y up, the face towards +z, subject left +x; single
-// precision. Materials and textures that are equal are written once. Surfaces are seen from both
-// sides. A normal of zero is written as (0, 0, 1), for glTF allows none. Throws InputError for a
-// part without triangles, with another number of normals, uv or colours than points, or
-// with a texture that is neither PNG nor JPEG.
+// Writes the nodes as one scene in metres, with +y up, the face towards +z and the subject's left
+// at +x, in single precision. Equal materials and textures are written once. Surfaces are visible
+// from both sides. A normal of zero becomes (0, 0, 1) because glTF allows no zero normals. Throws
+// InputError for a part without triangles, with another number of normals, uv or colours than
+// points, or with a texture that is neither PNG nor JPEG.
 std::string EncodeGlb(std::span<const GlbNode> nodes);
 
 }  // namespace semblance

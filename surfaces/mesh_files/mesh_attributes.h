@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a file of a mesh may carry beside the shape.
+// Data per vertex that a mesh file can contain in addition to the shape.
 #pragma once
 
 #include <array>
@@ -12,7 +12,8 @@
 namespace semblance {
 
 struct VertexScalar {
-  std::string name;            // in a PLY: MeshLab shows "quality", CloudCompare any "scalar_..."
+  // In a PLY, MeshLab shows the scalar "quality", and CloudCompare every "scalar_...".
+  std::string name;
   std::vector<double> values;  // NaN where there is no data
 };
 
@@ -23,7 +24,7 @@ struct MeshAttributes {
   std::vector<VertexScalar> scalars;
 };
 
-// Throws InputError if one has another number of entries.
+// Throws InputError if an attribute has neither zero entries nor one per vertex.
 void CheckAttributes(std::size_t vertices, const MeshAttributes& attributes);
 
 }  // namespace semblance

@@ -3,46 +3,22 @@
 
 #include <fmt/format.h>
 
-#include <OpenMesh/Core/IO/MeshIO.hh>
-#include <OpenMesh/Core/Mesh/PolyMesh_ArrayKernelT.hh>
 #include <algorithm>
 #include <bit>
 #include <cstring>
 #include <set>
-#include <sstream>
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 #include "surfaces/mesh_files/read_obj.h"
 #include "surfaces/mesh_files/read_off.h"
-#include "surfaces/mesh_files/read_parts.h"
 #include "surfaces/mesh_files/read_ply.h"
 #include "surfaces/mesh_files/read_stl.h"
-#include "surfaces/mesh_files/single_precision.h"
+#include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {
 namespace {
-
-struct Traits : OpenMesh::DefaultTraits {
-  using Point = OpenMesh::Vec3d;
-};
-using HalfedgeMesh = OpenMesh::PolyMesh_ArrayKernelT<Traits>;
-
-// OpenMesh reports to std::cerr through streams of its own; libraries do not print.
-class QuietOpenMesh {
- public:
-  QuietOpenMesh() {
-    omerr().disable();
-    omlog().disable();
-    omout().disable();
-  }
-  ~QuietOpenMesh() {
-    omerr().enable();
-    omlog().enable();
-    omout().enable();
-  }
-};
 
 std::string LowerExtension(const std::filesystem::path& path) {
   return LowerCase(path.extension().string());
@@ -83,13 +59,10 @@ void AppendVector(std::string& bytes, const Vec3& v, Precision precision) {
   }
 }
 
-// Double where single would lose of the coordinates what the mesh is to show.
+// Double if single precision would lose detail that the mesh shows; see EncodeMesh.
 Precision PrecisionFor(const TriMesh& mesh, double chord_mm) {
   constexpr double kOfChord = 0.02, kOfExtent = 1e-5;
-  Box3 box;
-  for (const Vec3& p : mesh.points) {
-    box.extend(p);
-  }
+  const Box3 box = Bounds(mesh);
   if (box.isEmpty()) {
     return Precision::kSingle;
   }
@@ -140,7 +113,7 @@ std::string EncodePly(const TriMesh& mesh, const MeshAttributes& attributes, Pre
   return bytes;
 }
 
-// Digits that single precision, or double, is read back from.
+// With enough digits that a reader gets the same number of that precision.
 std::string CoordinatesText(const Vec3& p, Precision precision) {
   const Vec3 single = p.cast<float>().cast<double>();
   return precision == Precision::kDouble
@@ -171,28 +144,24 @@ std::string EncodeOff(const TriMesh& mesh, Precision precision) {
   return text;
 }
 
+// 80 bytes of words, the number of triangles, and per triangle its unit normal, its corners and two
+// bytes of attributes.
 std::string EncodeStl(const TriMesh& mesh) {
-  const QuietOpenMesh quiet;
-  HalfedgeMesh halfedges;
-  for (const Vec3& p : mesh.points) {
-    halfedges.add_vertex({p.x(), p.y(), p.z()});
-  }
+  constexpr std::size_t kWords = 80;
+  std::string bytes = "binary stl file";
+  bytes.resize(kWords, ' ');
+  AppendRaw(bytes, static_cast<std::uint32_t>(mesh.triangles.size()));
   for (const Triangle& t : mesh.triangles) {
-    halfedges.add_face(OpenMesh::VertexHandle(t[0]), OpenMesh::VertexHandle(t[1]),
-                       OpenMesh::VertexHandle(t[2]));
+    const Vec3 area_vector = TriangleAreaVector(mesh, t);
+    const double area = area_vector.norm();
+    AppendVector(bytes, area > 0 ? Vec3(area_vector / area) : Vec3(Vec3::Zero()),
+                 Precision::kSingle);
+    for (const std::int32_t v : t) {
+      AppendVector(bytes, mesh.points[v], Precision::kSingle);
+    }
+    AppendRaw(bytes, std::uint16_t{0});
   }
-  if (halfedges.n_faces() != mesh.triangles.size()) {
-    throw InputError(fmt::format(
-        "mesh: {} of {} triangles are non-manifold and would be lost in .stl; write .ply instead",
-        mesh.triangles.size() - halfedges.n_faces(), mesh.triangles.size()));
-  }
-  std::ostringstream stream;
-  halfedges.request_face_normals();
-  halfedges.update_face_normals();
-  if (!OpenMesh::IO::write_mesh(halfedges, stream, ".stl", OpenMesh::IO::Options::Binary)) {
-    throw InputError("mesh: it could not be written as .stl");
-  }
-  return stream.str();
+  return bytes;
 }
 
 }  // namespace

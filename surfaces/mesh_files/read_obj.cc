@@ -6,36 +6,40 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <system_error>
 #include <unordered_set>
 #include <utility>
 #include <vector>
 
-#include "surfaces/mesh_files/read_parts.h"
 #include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {
 namespace {
 
-// What an OBJ may hold beside a triangle mesh.
-constexpr std::array<std::string_view, 18> kNotKept = {
+// Keywords that do not describe the shape.
+constexpr std::array<std::string_view, 18> kSkipped = {
     "vt", "vn", "vp",  "g",     "o",        "s",        "usemtl",     "mtllib",    "l",
     "p",  "mg", "lod", "bevel", "c_interp", "d_interp", "shadow_obj", "trace_obj", "usemap"};
 
 class ObjReader {
  public:
-  ObjReader(std::string_view bytes, const std::string& name)
-      : lines_(bytes, name, {.comment = '#'}) {}
+  enum class Keep { kShape, kLooks };
+  ObjReader(std::string_view bytes, const std::string& name, Keep keep)
+      : lines_(bytes, name, {.comment = '#'}), keeps_looks_(keep == Keep::kLooks) {}
 
-  TriMesh Read() {
+  ObjFile Read() {
     while (lines_.NextLine()) {
       const std::string_view keyword = lines_.NextWord();
       if (keyword == "v") {
         ReadVertex();
       } else if (keyword == "f") {
         ReadFace();
-      } else if (std::find(kNotKept.begin(), kNotKept.end(), keyword) == kNotKept.end()) {
+      } else if (keeps_looks_ && ReadLooks(keyword)) {
+        continue;
+      } else if (std::find(kSkipped.begin(), kSkipped.end(), keyword) == kSkipped.end()) {
         lines_.Fail(
             fmt::format("'{}' is not a keyword of a polygon mesh; vertices begin with 'v', "
                         "faces with 'f', comments with '#'",
@@ -43,7 +47,10 @@ class ObjReader {
       }
     }
     CheckHighest();
-    return std::move(mesh_);
+    if (obj_.colours.size() != mesh_.points.size()) {
+      obj_.colours.clear();
+    }
+    return std::move(obj_);
   }
 
  private:
@@ -53,28 +60,64 @@ class ObjReader {
       lines_.Fail(fmt::format("more than {} vertices; decimate the mesh", kMostElements));
     }
     mesh_.points.push_back(lines_.NextPoint());
-    int more = 0;
+    std::array<double, 4> numbers;
+    std::size_t more = 0;
     for (; !lines_.AtLineEnd(); ++more) {
-      lines_.NextDouble();
+      numbers[more % numbers.size()] = lines_.NextDouble();
     }
     if (more == 2 || more > 4) {
       lines_.Fail(fmt::format("a vertex has 3, 4, 6 or 7 numbers, this has {}", 3 + more));
     }
+    if (keeps_looks_ && more >= 3) {
+      KeepColour({numbers[more - 3], numbers[more - 2], numbers[more - 1]});
+    }
+  }
+
+  void KeepColour(const Vec3& colour) {
+    if ((colour.array() >= 0).all() && (colour.array() <= 1).all()) {
+      obj_.colours.push_back(colour);
+    }
+  }
+
+  // True if the line was one that decides the looks.
+  bool ReadLooks(std::string_view keyword) {
+    if (keyword == "vt") {
+      const double u = lines_.NextDouble(), v = lines_.AtLineEnd() ? 0 : lines_.NextDouble();
+      if (!std::isfinite(u) || !std::isfinite(v)) {
+        lines_.Fail("a texture coordinate is not finite; export the mesh again");
+      }
+      obj_.texture.emplace_back(u, v);
+    } else if (keyword == "usemtl") {
+      material_ = lines_.RestAsName();
+    } else if (keyword == "mtllib") {
+      obj_.libraries.emplace_back(lines_.RestAsName());
+    } else {
+      return false;
+    }
+    return true;
   }
 
   void ReadFace() {
     corners_.clear();
+    ObjPolygon polygon{{}, material_};
     while (!lines_.AtLineEnd()) {
-      corners_.push_back(ReadCorner(lines_.NextWord()));
+      const ObjPolygonCorner corner = ReadCorner(lines_.NextWord());
+      corners_.push_back(corner.point);
+      if (keeps_looks_) {
+        polygon.corners.push_back(corner);
+      }
     }
     if (corners_.size() < 3) {
       lines_.Fail(fmt::format("a face of {} corners; it needs at least 3", corners_.size()));
+    }
+    if (keeps_looks_) {
+      obj_.polygons.push_back(std::move(polygon));
     }
     RemoveRepeats();
     AppendFan(corners_, mesh_.triangles);
   }
 
-  // Leaves each vertex at its first place among the corners.
+  // Removes the corners that repeat an earlier one.
   void RemoveRepeats() {
     if (corners_.size() == 3 && corners_[0] != corners_[1] && corners_[1] != corners_[2] &&
         corners_[2] != corners_[0]) {
@@ -84,24 +127,39 @@ class ObjReader {
     std::erase_if(corners_, [&](std::int32_t corner) { return !seen.insert(corner).second; });
   }
 
-  // "7", "7/1", "7//3", "7/1/3": the vertex, then what is not kept.
-  std::int32_t ReadCorner(std::string_view word) {
-    std::int64_t vertex = 0;
+  // "7", "7/1", "7//3" or "7/1/3": a vertex, a texture coordinate and a normal, which is skipped.
+  ObjPolygonCorner ReadCorner(std::string_view word) {
+    constexpr std::int64_t kNone = std::numeric_limits<std::int64_t>::min();
+    std::int64_t vertex = 0, texture = kNone;
     std::string_view rest = word;
-    if (!TakeInteger(rest, vertex) || !IsTextureAndNormal(rest)) {
+    if (!TakeInteger(rest, vertex) || !TakeTextureAndNormal(rest, texture)) {
       lines_.Fail(fmt::format(
           "'{}' is not a corner of a face; corners are like 7, 7/1, 7//3 or 7/1/3", Shown(word)));
     }
-    const auto count = static_cast<std::int64_t>(mesh_.points.size());
-    const std::int64_t index = vertex > 0 ? vertex - 1 : count + vertex;
-    if (vertex == 0 || index < 0 || index >= kMostElements) {
-      lines_.Fail(fmt::format(
-          "a face names vertex {}; allowed are 1 to the number of vertices, or -1 to -{}", vertex,
-          count));
+    ObjPolygonCorner corner{
+        .point = FindIndex(vertex, "vertex", "vertices", mesh_.points.size(), highest_vertex_)};
+    if (keeps_looks_ && texture != kNone) {
+      corner.texture = FindIndex(texture, "texture coordinate", "texture coordinates",
+                                 obj_.texture.size(), highest_texture_);
     }
-    if (index > highest_) {
-      highest_ = index;
-      highest_line_ = lines_.LineNumber();
+    return corner;
+  }
+
+  struct HighestIndex {
+    std::int64_t index = -1, line = 0;
+  };
+
+  // The index from 0 of a thing that a face names from 1, or from -1 backwards.
+  std::int32_t FindIndex(std::int64_t given, const char* thing, const char* things,
+                         std::size_t so_far, HighestIndex& highest) const {
+    const auto count = static_cast<std::int64_t>(so_far);
+    const std::int64_t index = given > 0 ? given - 1 : count + given;
+    if (given == 0 || index < 0 || index >= kMostElements) {
+      lines_.Fail(fmt::format("a face names {} {}; allowed are 1 to the number of {}, or -1 to -{}",
+                              thing, given, things, count));
+    }
+    if (index > highest.index) {
+      highest = {index, lines_.LineNumber()};
     }
     return static_cast<std::int32_t>(index);
   }
@@ -115,37 +173,51 @@ class ObjReader {
     return error == std::errc();
   }
 
-  static bool IsTextureAndNormal(std::string_view rest) {
-    for (int part = 0; part < 2 && rest.starts_with('/'); ++part) {
+  // texture: stays as it is if the corner has none.
+  static bool TakeTextureAndNormal(std::string_view rest, std::int64_t& texture) {
+    std::int64_t normal = 0;
+    for (std::int64_t* part : {&texture, &normal}) {
+      if (!rest.starts_with('/')) {
+        break;
+      }
       rest.remove_prefix(1);
-      std::int64_t ignored = 0;
-      if (!rest.empty() && rest.front() != '/') {
-        if (!TakeInteger(rest, ignored)) {
-          return false;
-        }
+      if (!rest.empty() && rest.front() != '/' && !TakeInteger(rest, *part)) {
+        return false;
       }
     }
     return rest.empty();
   }
 
-  // A face may name vertices that follow it.
+  // A face may name things that follow it.
   void CheckHighest() const {
-    if (highest_ >= static_cast<std::int64_t>(mesh_.points.size())) {
-      lines_.FailAt(highest_line_, fmt::format("a face names vertex {}; the file has {}",
-                                               highest_ + 1, mesh_.points.size()));
+    Check(highest_vertex_, "vertex", mesh_.points.size());
+    Check(highest_texture_, "texture coordinate", obj_.texture.size());
+  }
+
+  void Check(const HighestIndex& highest, const char* thing, std::size_t count) const {
+    if (highest.index >= static_cast<std::int64_t>(count)) {
+      lines_.FailAt(highest.line, fmt::format("a face names {} {}; the file has {}", thing,
+                                              highest.index + 1, count));
     }
   }
 
   TextLines lines_;
-  TriMesh mesh_;
+  bool keeps_looks_;
+  ObjFile obj_;
+  TriMesh& mesh_ = obj_.mesh;
+  std::string material_;
   std::vector<std::int32_t> corners_;
-  std::int64_t highest_ = -1, highest_line_ = 0;
+  HighestIndex highest_vertex_, highest_texture_;
 };
 
 }  // namespace
 
 TriMesh ReadObj(std::string_view bytes, const std::string& name) {
-  return ObjReader(bytes, name).Read();
+  return ObjReader(bytes, name, ObjReader::Keep::kShape).Read().mesh;
+}
+
+ObjFile ReadObjFile(std::string_view bytes, const std::string& name) {
+  return ObjReader(bytes, name, ObjReader::Keep::kLooks).Read();
 }
 
 }  // namespace semblance

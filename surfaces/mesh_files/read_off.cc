@@ -7,7 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "surfaces/mesh_files/read_parts.h"
 #include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {
@@ -42,10 +41,10 @@ class OffReader {
     if (off == std::string_view::npos || !TakeExtras(word.substr(0, off))) {
       lines_.Fail(fmt::format("'{}' is not a header that is read; {}", Shown(word), kAllowed));
     }
-    lines_.StepBack(word.size() - off - 3);  // some files have the counts right behind: OFF8 6 12
+    lines_.StepBack(word.size() - off - 3);  // some files continue with the counts: OFF8 6 12
   }
 
-  // What each vertex has beside x y z.
+  // Counts the numbers that each vertex has in addition to x y z.
   bool TakeExtras(std::string_view prefix) {
     while (!prefix.empty()) {
       const bool texture = prefix.starts_with("ST"), colour = prefix.front() == 'C';
@@ -115,7 +114,7 @@ class OffReader {
     }
   }
 
-  // None, an index, or three or four numbers.
+  // A colour is nothing, an index, or three or four numbers.
   void SkipColour() {
     for (int k = 0; k < 4 && !lines_.AtLineEnd(); ++k) {
       lines_.NextDouble();

@@ -9,13 +9,12 @@
 
 namespace semblance {
 
-// The vertices (TextLines::NextPoint) and polygons of a text OFF, polygons fanned into triangles.
-// Each vertex and each face is a line; comments begin with '#'. The header may be OFF with any of
-// ST (texture), C (colours), N (normals) before it; these are not kept, neither are colours of
-// faces. name: the file, for messages.
-// Throws InputError with the line for anything else: OFF BINARY, four or n dimensions, counts that
-// do not fit the file, fewer than 3 corners, an index out of range, a coordinate that is not
-// finite.
+// Reads the vertices (TextLines::NextPoint) and polygons of a text OFF; polygons become triangles.
+// Each vertex and each face is a line; comments begin with '#'. The header may be OFF with ST
+// (texture), C (colours) and N (normals) before it; these are skipped, as are colours of faces.
+// name: the file, for messages. Throws InputError with the line for anything else: OFF BINARY, four
+// or n dimensions, counts that do not fit the file, fewer than 3 corners, an index out of range, a
+// coordinate that is not finite.
 TriMesh ReadOff(std::string_view bytes, const std::string& name);
 
 }  // namespace semblance

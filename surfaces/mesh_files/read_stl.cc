@@ -13,13 +13,12 @@
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh_files/read_parts.h"
 #include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance {
 namespace {
 
-constexpr std::size_t kHeader = 84, kRecord = 50;  // bytes: 80 of words and a count; a triangle
+constexpr std::size_t kHeader = 84, kRecord = 50;  // bytes: 80 of words and a count; one triangle
 
 using Corner = std::array<float, 3>;
 
@@ -34,7 +33,7 @@ struct CornerHash {
   }
 };
 
-// Triangles of points of their own become a mesh.
+// Joins separate triangles at equal corners.
 class Welder {
  public:
   void Add(const std::array<Vec3, 3>& corners) {
@@ -63,7 +62,7 @@ class Welder {
   TriMesh mesh_;
 };
 
-// In letters of either case.
+// Compares without regard to case.
 bool Is(std::string_view word, std::string_view expected) {
   return std::equal(word.begin(), word.end(), expected.begin(), expected.end(),
                     [](unsigned char a, char b) { return std::tolower(a) == b; });
@@ -176,8 +175,8 @@ TriMesh ReadBinary(std::string_view bytes, const std::string& name) {
   return welder.Take();
 }
 
-// The headers of many binary files begin with 'solid' too; then their size fits their count, or
-// there are zeros among the words.
+// The words of many binary files begin with 'solid' too. Such a file has the size that its count
+// requires, or zeros among the words.
 bool IsText(std::string_view bytes) {
   if (bytes.size() >= kHeader && bytes.size() == kHeader + kRecord * HeaderCount(bytes)) {
     return false;

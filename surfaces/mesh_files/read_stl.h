@@ -9,11 +9,12 @@
 
 namespace semblance {
 
-// The triangles of an STL. Equal corners (in single precision) become one point, in the order of
-// their first use. A triangle with two equal corners is left out, as slicers and mesh libraries do;
-// its points stay. Normals and attributes are not kept. name: the file, for messages.
-// Throws InputError with the line (text) or byte (binary) for anything else: a size other than the
-// header says, facets of other than 3 vertices, a coordinate that is not finite.
+// Reads the triangles of an STL. Corners that are equal in single precision become one point;
+// points are in the order of their first use. A triangle with two equal corners is dropped, as
+// slicers and mesh libraries do, but its points stay. Normals and attributes are skipped. name: the
+// file, for messages. Throws InputError with the line (text) or byte (binary) for anything else: a
+// size other than the header says, facets of other than 3 vertices, a coordinate that is not
+// finite.
 TriMesh ReadStl(std::string_view bytes, const std::string& name);
 
 }  // namespace semblance

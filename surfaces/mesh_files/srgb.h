@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The transfer curve of sRGB (IEC 61966-2-1). Light adds up linearly; files hold the encoded value.
+// The transfer curve of sRGB (IEC 61966-2-1). Files contain the encoded value; arithmetic with
+// light needs the linear one.
 #pragma once
 
 #include <algorithm>
@@ -19,7 +20,7 @@ inline double SrgbFromLinear(double v) {
   return v <= 0.0031308 ? 12.92 * v : 1.055 * std::pow(v, 1 / 2.4) - 0.055;
 }
 
-// SrgbFromLinear as a byte, by a table fine enough that the byte is right to one half plus 0.03.
+// SrgbFromLinear as a byte, from a table. The byte is off by at most 0.53 of a step.
 inline std::uint8_t SrgbByte(float linear) {
   constexpr int kEntries = 1 << 16;
   static const std::vector<std::uint8_t> kTable = [] {

@@ -6,19 +6,18 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <system_error>
 #include <utility>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh_files/read_parts.h"
-#include "surfaces/mesh_files/single_precision.h"
 
 namespace semblance {
 namespace {
 
 bool IsBlank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
 
-// from_chars, but for a leading plus sign, which it does not take.
+// Like from_chars, but with a leading plus sign, which from_chars refuses.
 template <class T>
 std::from_chars_result Parse(const char* begin, const char* end, T& value) {
   if (end - begin > 1 && begin[0] == '+' && begin[1] != '-') {
@@ -29,6 +28,32 @@ std::from_chars_result Parse(const char* begin, const char* end, T& value) {
 
 }  // namespace
 
+double SingleStep(double coordinate) {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  const float single = std::abs(static_cast<float>(coordinate));
+  return std::isfinite(single) ? double{std::nextafter(single, kInfinity)} - single : kInfinity;
+}
+
+void AppendFan(std::span<const std::int32_t> corners, std::vector<Triangle>& triangles) {
+  for (std::size_t c = 2; c < corners.size(); ++c) {
+    triangles.push_back({corners[0], corners[c - 1], corners[c]});
+  }
+}
+
+std::string Shown(std::string_view piece) {
+  constexpr std::size_t kLongest = 40;
+  std::string shown(piece.substr(0, kLongest));
+  std::replace_if(
+      shown.begin(), shown.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
+  return piece.size() > kLongest ? shown + "..." : shown;
+}
+
+bool IsPadding(std::string_view bytes) {
+  return std::all_of(bytes.begin(), bytes.end(), [](char c) {
+    return c == ' ' || c == '\t' || c == '\r' || c == '\n' || c == '\0';
+  });
+}
+
 TextLines::TextLines(std::string_view text, std::string name, const Options& options)
     : text_(text),
       name_(std::move(name)),
@@ -38,7 +63,7 @@ TextLines::TextLines(std::string_view text, std::string name, const Options& opt
 bool TextLines::NextLine() {
   while (next_ < text_.size()) {
     const std::size_t end = std::min(text_.find('\n', next_), text_.size());
-    line_ = text_.substr(next_, end - next_);
+    line_ = whole_line_ = text_.substr(next_, end - next_);
     next_ = std::min(end + 1, text_.size());
     ++number_;
     at_ = 0;
@@ -49,7 +74,7 @@ bool TextLines::NextLine() {
       return true;
     }
   }
-  line_ = {};
+  line_ = whole_line_ = {};
   at_ = 0;
   return false;
 }
@@ -75,7 +100,18 @@ std::string_view TextLines::RestOfLine() {
   return line_.substr(at_);
 }
 
-// Too small for T is zero; too large is an error.
+std::string_view TextLines::RestAsName() {
+  std::string_view rest = whole_line_.substr(at_);
+  while (!rest.empty() && IsBlank(rest.front())) {
+    rest.remove_prefix(1);
+  }
+  while (!rest.empty() && IsBlank(rest.back())) {
+    rest.remove_suffix(1);
+  }
+  return rest;
+}
+
+// A number that is too small for T becomes zero; one that is too large is an error.
 template <class T>
 T TextLines::OutOfRange(std::string_view word) const {
   double value = 0;

@@ -1,17 +1,41 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lines of a mesh file that is text, and the words and numbers of each line. Whatever is wrong
-// is an InputError that names the file and the line.
+// Shared by the readers of mesh files: the lines, words and numbers of a text, limits, and the
+// precision of coordinates.
 #pragma once
 
 #include <cstdint>
-#include <limits>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "surfaces/base/geometry.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance {
 
+// The largest number of vertices, faces or other elements in a file: an index of a triangle can
+// name no more.
+inline constexpr std::int64_t kMostElements = 2147483647;
+
+// The largest step between coordinates that loses nothing of a mesh. Single precision has smaller
+// steps below 1024 mm.
+inline constexpr double kCoordinateStep_mm = 1e-4;
+
+// The step from a coordinate to the next in single precision: 3e-5 at 300, 0.5 at five million,
+// infinity beyond the range.
+double SingleStep(double coordinate);
+
+// Appends a polygon as triangles that share its first corner; none if it has fewer than 3 corners.
+void AppendFan(std::span<const std::int32_t> corners, std::vector<Triangle>& triangles);
+
+// A piece of a file for a message: at most 40 characters, with '?' for those that cannot be
+// printed.
+std::string Shown(std::string_view piece);
+
+// True if the bytes are white space and zeros only, with which some programs pad a file.
+bool IsPadding(std::string_view bytes);
+
+// Reads a text line by line. Every fault is an InputError that names the file and the line.
 class TextLines {
  public:
   struct Options {
@@ -25,22 +49,24 @@ class TextLines {
   bool NextLine();
   std::int64_t LineNumber() const { return number_; }
 
-  // Of the current line:
+  // These read the current line.
   bool AtLineEnd();
   std::string_view NextWord();  // empty at the line's end
   float NextFloat();            // may be NaN or infinite
   double NextDouble();          // may be NaN or infinite
-  // Three finite numbers, mm: of single precision, with all their digits where its steps are more
-  // than 1e-4 mm, which is from 1024 mm on.
+  // Three finite numbers, mm. They have single precision, or all their digits if the steps of
+  // single precision exceed kCoordinateStep_mm there, which is so from 1024 mm on.
   Vec3 NextPoint();
   // what: for the message, e.g. "number of vertices".
   std::int64_t NextInteger(const char* what, std::int64_t lowest, std::int64_t highest);
   void ExpectLineEnd();
   std::string_view RestOfLine();
+  // The rest of the line with spaces and '#', which names in an OBJ may contain; without white
+  // space at its ends.
+  std::string_view RestAsName();
   void StepBack(std::size_t bytes) { at_ -= bytes; }  // into the word just read
 
-  // Of the text:
-  std::size_t Position() const { return next_; }  // where the next line begins
+  std::size_t NextLineStart() const { return next_; }  // in bytes of the text
   std::size_t BytesLeft() const { return text_.size() - next_; }
 
   // what: what is wrong; what is allowed or what to do.
@@ -53,7 +79,7 @@ class TextLines {
   template <class T>
   T OutOfRange(std::string_view word) const;
 
-  std::string_view text_, line_;
+  std::string_view text_, whole_line_, line_;  // line_ is whole_line_ without the comment
   std::string name_;
   char comment_;
   std::size_t next_ = 0, at_ = 0;

@@ -16,7 +16,7 @@
 namespace semblance {
 namespace {
 
-constexpr std::uint8_t kTriangle = 5;  // VTK's number of the cell
+constexpr std::uint8_t kTriangle = 5;  // the number of the cell type in VTK
 
 template <class T>
 constexpr const char* kVtkType = nullptr;
@@ -27,14 +27,14 @@ constexpr const char* kVtkType<std::int64_t> = "Int64";
 template <>
 constexpr const char* kVtkType<std::uint8_t> = "UInt8";
 
-// Little-endian, as the file's head says.
+// Little-endian, as the head of the file states.
 template <class T>
 void AppendRaw(std::string& bytes, T value) {
   static_assert(std::endian::native == std::endian::little);
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-// One array: its size in bytes and its numbers, as one piece of Base64.
+// One array as Base64: its size in bytes, then its numbers.
 template <class T>
 std::string ArrayXml(const std::string& name, int components, const std::vector<T>& numbers) {
   std::string bytes;
@@ -75,7 +75,7 @@ std::vector<std::int64_t> Offsets(std::size_t triangles) {
   return offsets;
 }
 
-// Without what XML or a list of names of VTK could not hold.
+// The name without characters that XML or a list of names in VTK cannot hold.
 std::string PlainName(std::string_view name) {
   constexpr std::string_view kPrefix = "scalar_";
   if (name.starts_with(kPrefix) && name.size() > kPrefix.size()) {
@@ -89,7 +89,7 @@ std::string PlainName(std::string_view name) {
   return plain;
 }
 
-// Bit for bit, where both are numbers.
+// True if the values are equal; NaN equals NaN.
 bool SameValues(const std::vector<double>& a, const std::vector<double>& b) {
   return std::ranges::equal(
       a, b, [](double x, double y) { return x == y || (std::isnan(x) && std::isnan(y)); });
@@ -144,7 +144,8 @@ std::string PointDataXml(const MeshAttributes& attributes) {
   return text + "</PointData>\n";
 }
 
-// kind: of the data set. counts, cells: what follows the points in the piece's head and body.
+// kind: of the data set. counts, cells: the parts that follow the points in the head and the body
+// of the piece.
 std::string FileXml(const char* kind, const std::string& counts, const std::string& cells,
                     const TriMesh& mesh, const MeshAttributes& attributes) {
   CheckAttributes(mesh.points.size(), attributes);

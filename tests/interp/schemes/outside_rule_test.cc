@@ -7,7 +7,7 @@
 #include "interp/schemes/network_schemes.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance {

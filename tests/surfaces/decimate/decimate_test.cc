@@ -350,20 +350,33 @@ TEST(Decimate, RefusesWhatItCannotTake) {
   TriMesh bad = plate;
   bad.points[3].y() = kNaN;
   EXPECT_THROW(Decimate(bad, {}), InputError);
-  TriMesh fin = plate;
-  fin.points.emplace_back(5, 5, 5);
-  fin.triangles.push_back({6, 7, 25});
-  EXPECT_THROW(Decimate(fin, {}), InputError);
-  TriMesh turned = plate;
-  std::swap(turned.triangles[7][0], turned.triangles[7][1]);
-  EXPECT_THROW(Decimate(turned, {}), InputError);
-  TriMesh pinched = Joined(plate, Plate(10, 4));
+}
+
+// Real scans have edges with three triangles, turned triangles and pinched vertices.
+TEST(Decimate, AMeshThatIsNoManifoldLosesNoTriangleAtItsFaults) {
+  const TriMesh sphere = SphereMesh({0, 0, 0}, 30, 40);
+  TriMesh fin = sphere;
+  const auto tip = static_cast<std::int32_t>(fin.points.size());
+  fin.points.emplace_back(0, 0, 45);
+  fin.triangles.push_back({sphere.triangles[900][0], sphere.triangles[900][1], tip});
+  TriMesh turned = sphere;
+  std::swap(turned.triangles[700][0], turned.triangles[700][1]);
+  TriMesh pinched = Joined(Noisy(Plate(30, 20), 0.01), Noisy(Plate(30, 20), 0.01));
   for (Triangle& t : pinched.triangles) {
-    for (std::int32_t& v : t) {
-      v = v == 25 ? 24 : v;  // two plates that meet in a corner
-    }
+    std::ranges::replace(t, 441, 440);  // the first corner of one plate, the last of the other
   }
-  EXPECT_THROW(Decimate(pinched, {}), InputError);
+  for (const TriMesh& mesh : {fin, turned, pinched}) {
+    const int target = static_cast<int>(mesh.triangles.size()) / 4;
+    const DecimateResult result = Decimate(mesh, {.target_triangles = target, .tolerance_mm = 2});
+    EXPECT_LE(result.summary.triangles, target);
+    EXPECT_EQ(result.summary.triangles, int(result.mesh.triangles.size()));
+    const EdgeReport before = CheckEdges(mesh), after = CheckEdges(result.mesh);
+    EXPECT_EQ(after.non_manifold, before.non_manifold);
+    EXPECT_EQ(after.inconsistent, before.inconsistent);
+    EXPECT_EQ(after.boundary > 0, before.boundary > 0);
+    EXPECT_EQ(ConnectedComponents(result.mesh).count, ConnectedComponents(mesh).count);
+    EXPECT_LE(Furthest(mesh, result.mesh, kVerticesOnly), 2);
+  }
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <algorithm>
 
 #include "surfaces/base/random.h"
-#include "surfaces/mesh/point_triangle.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
 namespace semblance {

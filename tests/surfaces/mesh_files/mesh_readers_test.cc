@@ -217,6 +217,47 @@ TEST(MeshReaders, ColoursOfATextPlyAreBytesOrRefused) {
   }
 }
 
+TEST(MeshReaders, AnObjWithItsLooks) {
+  const ObjFile obj = ReadObjFile(
+      "mtllib my skin #1.mtl \nv 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0.5 0 0.25\nvt 0.25 0.5 1\n"
+      "f 1/1 2 2/-1 3\nusemtl the skin#2 \nvt 0.75\nf 1/2/7 2/1 3//4\n",
+      "a.obj");
+  EXPECT_EQ(obj.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 1, 2}}));
+  EXPECT_EQ(obj.libraries, std::vector<std::string>{"my skin #1.mtl"});
+  EXPECT_EQ(obj.texture, (std::vector<Vec2>{{0.25, 0.5}, {0.75, 0}}));
+  EXPECT_EQ(obj.colours, (std::vector<Vec3>{{1, 0, 0}, {0, 1, 0}, {0.5, 0, 0.25}}));
+  ASSERT_EQ(obj.polygons.size(), 2u);
+  EXPECT_EQ(obj.polygons[0].material, "");
+  EXPECT_EQ(obj.polygons[1].material, "the skin#2");
+  std::vector<std::pair<int, int>> corners;
+  for (const ObjPolygon& polygon : obj.polygons) {
+    for (const ObjPolygonCorner& corner : polygon.corners) {
+      corners.emplace_back(corner.point, corner.texture);
+    }
+  }
+  EXPECT_EQ(corners, (std::vector<std::pair<int, int>>{
+                         {0, 0}, {1, -1}, {1, 0}, {2, -1}, {0, 1}, {1, 0}, {2, -1}}));
+}
+
+TEST(MeshReaders, AnObjWithItsLooksIsReadStrictly) {
+  const std::string points = "v 0 0 0\nv 1 0 0 1 1 1\nv 0 1 0\n";
+  EXPECT_TRUE(ReadObjFile(points + "f 1 2 3\n", "a.obj").colours.empty());
+  for (const auto& [more, message] :
+       {std::pair("f 1/0 2 3\n", "a.obj: line 4: a face names texture coordinate 0"),
+        std::pair("f 1/-1 2 3\nvt 0 0\n", "line 4: a face names texture coordinate -1"),
+        std::pair("vt 0 0\nf 1/2 2 3\n",
+                  "line 5: a face names texture coordinate 2; the file has 1"),
+        std::pair("vt nan 0\n", "line 4: a texture coordinate is not finite"),
+        std::pair("vt\n", "line 4: a number is missing")}) {
+    try {
+      ReadObjFile(points + more, "a.obj");
+      ADD_FAILURE() << more;
+    } catch (const InputError& e) {
+      EXPECT_THAT(e.what(), HasSubstr(message));
+    }
+  }
+}
+
 TEST(MeshReaders, RelativeAndLaterVerticesOfAnObj) {
   EXPECT_EQ(Read(".obj", kObj).triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 1, 2}, {0, 2, 3}}));
   EXPECT_EQ(Read(".obj", "f 1 2 3\nv 0 0 0\nv 1 0 0 1\nv 0 1 0 0.1 0.2 0.3\nf -1 -2 -3\nv 5 5 5\n")

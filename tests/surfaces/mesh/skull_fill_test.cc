@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "surfaces/mesh/remesh.h"
+#include "surfaces/mesh/skull_fill.h"
 
 #include <gtest/gtest.h>
 
