@@ -88,11 +88,13 @@ constexpr double kCoarseFactor = 4, kFineFactor = 2;
 // Held-out error, relative to the extent, that is round-off: mean squares are differences of sums.
 constexpr double kRounding = 1e-8;
 
-[[noreturn]] void Fail(const std::string& what) { throw InputError("fit: plan auto: " + what); }
+[[noreturn]] void RefuseFit(const std::string& what) {
+  throw InputError("fit: plan auto: " + what);
+}
 
 constexpr std::size_t kMinPoints = 16;  // so that a tenth of them is at least one point
 [[noreturn]] void FailForFew(std::size_t count, const char* of_kind) {
-  Fail(
+  RefuseFit(
       fmt::format("{} points{} are too few to hold some out; give at least {}, or choose another "
                   "plan",
                   count, of_kind, kMinPoints));
@@ -321,7 +323,7 @@ class NestedFitter {
     between_ = search.Between();
     least_gain_ = search.least_gain();
     if (std::isnan(chosen.weight)) {
-      Fail("no smoothness has a usable solve; give more points than a plane needs");
+      RefuseFit("no smoothness has a usable solve; give more points than a plane needs");
     }
     weight_ = chosen.weight;
     metric_ = solve_.metric();
@@ -693,7 +695,7 @@ void CheckWeights(const ScatteredPoints& points) {
     sum += weight;
   }
   if (!std::isfinite(sum)) {
-    Fail("the points' weights add up to no finite number; divide them all by the largest");
+    RefuseFit("the points' weights add up to no finite number; divide them all by the largest");
   }
 }
 
@@ -701,7 +703,8 @@ void CheckWeights(const ScatteredPoints& points) {
 
 void CheckNested(const HSplineSurface& start, const ScatteredPoints& points) {
   if (!start.Offsets().empty()) {
-    Fail("the start has detail of finer levels; give a start without it, or use plan adaptive");
+    RefuseFit(
+        "the start has detail of finer levels; give a start without it, or use plan adaptive");
   }
   if (points.size() < kMinPoints) {
     FailForFew(points.size(), "");
@@ -709,7 +712,7 @@ void CheckNested(const HSplineSurface& start, const ScatteredPoints& points) {
   CheckWeights(points);
   const Vec2 lengths_mm = MeanLengths(start);
   if (!(lengths_mm.allFinite() && lengths_mm.minCoeff() > 0)) {
-    Fail("the points have no extent along u or v; give other (u,v)");
+    RefuseFit("the points have no extent along u or v; give other (u,v)");
   }
 }
 

@@ -11,7 +11,8 @@
 namespace semblance {
 namespace {
 
-constexpr int kMaxSteps = 300;  // solves take up to about 80 steps (docs/fit.md); bounds the loop
+constexpr int kMaxGradientSteps =
+    300;  // solves take up to about 80 steps (docs/fit.md); bounds the loop
 
 using Shares = std::vector<std::vector<double>>;  // by level and patch
 
@@ -394,7 +395,7 @@ int NestedSolve::Solve(double least_gain) {
     gains.push_back(Begin(c, least_gain));
   }
   int steps = 0;
-  for (; steps < kMaxSteps && std::ranges::any_of(gains, &ChannelGain::IsMore); ++steps) {
+  for (; steps < kMaxGradientSteps && std::ranges::any_of(gains, &ChannelGain::IsMore); ++steps) {
     Multiply(direction_, product_);
     for (int c = 0; c < Channels(); ++c) {
       Advance(c, gains[c]);

@@ -16,7 +16,7 @@ namespace {
 
 // Points that share a median; half as many more on each side enter it. Larger blocks give steadier
 // medians, smaller ones follow detail.
-constexpr std::ptrdiff_t kBlock = 24;
+constexpr std::ptrdiff_t kOutlierBlock = 24;
 constexpr int kNearest = 8;  // neighbours that confirm a residual
 constexpr int kWindow = 20;  // points on each side of the curve that are searched for neighbours
 constexpr int kPasses = 4;   // each pass drops the last pass's outliers from the medians
@@ -64,9 +64,9 @@ class OutlierSearch {
       if (std::find(stale.begin() + first, stale.begin() + last, 1) == stale.begin() + last) {
         continue;
       }
-      Read(first * kBlock, std::min(last * kBlock, count_));
+      Read(first * kOutlierBlock, std::min(last * kOutlierBlock, count_));
       for (std::ptrdiff_t block = first; block < last; ++block) {
-        changed[block] = stale[block] != 0 && PassBlock(block * kBlock, found) ? 1 : 0;
+        changed[block] = stale[block] != 0 && PassBlock(block * kOutlierBlock, found) ? 1 : 0;
       }
     }
     return changed;
@@ -104,12 +104,15 @@ class OutlierSearch {
 
   // The region around a block, whose points share a median.
   static std::ptrdiff_t RegionBegin(std::ptrdiff_t begin) {
-    return std::max<std::ptrdiff_t>(begin - kBlock / 2, 0);
+    return std::max<std::ptrdiff_t>(begin - kOutlierBlock / 2, 0);
   }
-  std::ptrdiff_t RegionEnd(std::ptrdiff_t end) const { return std::min(end + kBlock / 2, count_); }
+  std::ptrdiff_t RegionEnd(std::ptrdiff_t end) const {
+    return std::min(end + kOutlierBlock / 2, count_);
+  }
 
   void MeasureAround(std::ptrdiff_t k) {
-    const std::ptrdiff_t begin = k - k % kBlock, end = std::min(begin + kBlock, count_);
+    const std::ptrdiff_t begin = k - k % kOutlierBlock,
+                         end = std::min(begin + kOutlierBlock, count_);
     Read(begin, end);
     MeasureRegion(RegionBegin(begin), RegionEnd(end));
   }
@@ -137,7 +140,7 @@ class OutlierSearch {
 
   // Updates the flags of a block. Returns whether any changed.
   bool PassBlock(std::ptrdiff_t begin, std::vector<char>& found) {
-    const std::ptrdiff_t end = std::min(begin + kBlock, count_), around = RegionBegin(begin),
+    const std::ptrdiff_t end = std::min(begin + kOutlierBlock, count_), around = RegionBegin(begin),
                          behind = RegionEnd(end);
     const bool smooth = points_.weight.empty() && IsSmoothRegion(around, behind);
     if (!smooth) {
@@ -160,7 +163,7 @@ class OutlierSearch {
         median_points_.push_back(k);
       }
     }
-    if (std::ssize(median_points_) < kBlock / 3) {
+    if (std::ssize(median_points_) < kOutlierBlock / 3) {
       median_points_.resize(end - begin);
       std::iota(median_points_.begin(), median_points_.end(), begin);
     }
@@ -344,12 +347,12 @@ std::vector<char> WithNeighbours(const std::vector<char>& changed) {
 
 // Repeats passes until no flag changes. A pass updates only the blocks that the last pass affects.
 int Search(OutlierSearch search, std::size_t every, std::vector<char>& outlier) {
-  static_assert(kWindow < kBlock);
+  static_assert(kWindow < kOutlierBlock);
   std::vector<char> found(search.count());
   for (std::size_t k = 0; k < found.size(); ++k) {
     found[k] = outlier[k * every];
   }
-  std::vector<char> stale((found.size() + kBlock - 1) / kBlock, 1);
+  std::vector<char> stale((found.size() + kOutlierBlock - 1) / kOutlierBlock, 1);
   for (int pass = 0; pass < kPasses; ++pass) {
     const std::vector<char> before = found;
     stale = WithNeighbours(search.Pass(before, stale, found));

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kRunPoints = 16384;
 
 using ColumnPerPoint = Eigen::Matrix<double, 16, Eigen::Dynamic>;
-constexpr std::array<std::pair<int, int>, 6> kPairs = {
+constexpr std::array<std::pair<int, int>, 6> kTangentPairs = {
     {{0, 0}, {1, 0}, {1, 1}, {2, 0}, {2, 1}, {2, 2}}};  // pairs of coordinates
 
 // weights * diag(factors) * weights^T, over the element's dofs.
@@ -74,13 +74,13 @@ Eigen::MatrixXd TangentSums::RunNormalMatrix(const Run& run, const SplineElement
     weights.col(k) = Eigen::Map<const Eigen::Matrix<double, 16, 1>>(at.weight.data());
     const Mat3 metric = MetricAt(run.begin + k);
     for (int p = 0; p < 6; ++p) {
-      factors(k, p) = metric(kPairs[p].first, kPairs[p].second);
+      factors(k, p) = metric(kTangentPairs[p].first, kTangentPairs[p].second);
     }
   }
   const auto dofs = static_cast<Eigen::Index>(element.dofs.size());
   Eigen::MatrixXd normal(3 * dofs, 3 * dofs);
   for (int p = 0; p < 6; ++p) {
-    const auto [i, j] = kPairs[p];
+    const auto [i, j] = kTangentPairs[p];
     const Eigen::MatrixXd gram = GramOver(element, weights, factors.col(p));
     for (Eigen::Index a = 0; a < dofs; ++a) {
       for (Eigen::Index b = 0; b < dofs; ++b) {

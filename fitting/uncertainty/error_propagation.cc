@@ -23,7 +23,7 @@ namespace {
 
 constexpr Eigen::Index kAtOnce = 64;  // right-hand sides per solve; bounds the memory
 
-bool IsOfPoints(const Term& term) {
+bool IsPointTerm(const Term& term) {
   return std::holds_alternative<PointTerm>(term) || std::holds_alternative<LandmarkTerm>(term) ||
          std::holds_alternative<TangentPointTerm>(term);
 }
@@ -34,14 +34,14 @@ bool TreatsAxesAlike(const Term& term) { return SeparableButForLoss(std::span(&t
 std::vector<Term> OthersAmong(std::span<const Term> terms) {
   std::vector<Term> others;
   std::copy_if(terms.begin(), terms.end(), std::back_inserter(others),
-               [](const Term& term) { return WeightOf(term) > 0 && !IsOfPoints(term); });
+               [](const Term& term) { return WeightOf(term) > 0 && !IsPointTerm(term); });
   return others;
 }
 
 std::vector<std::string_view> LeftOut(std::span<const Term> terms) {
   std::vector<std::string_view> names;
   for (const Term& term : terms) {
-    if (!TreatsAxesAlike(term) && !IsOfPoints(term)) {
+    if (!TreatsAxesAlike(term) && !IsPointTerm(term)) {
       names.push_back(TermName(term));
     }
   }

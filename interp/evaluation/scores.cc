@@ -13,7 +13,7 @@ namespace semblance {
 namespace {
 
 constexpr int kLevels = 19;  // 5 % .. 95 %
-constexpr double kRounding = 1e-9;
+constexpr double kScoreRounding = 1e-9;
 
 double Density(double z) { return std::exp(-z * z / 2) / std::sqrt(2 * std::numbers::pi); }
 double Cumulative(double z) { return std::erfc(-z / std::numbers::sqrt2) / 2; }
@@ -94,7 +94,7 @@ double ShareAround(double error, double sd) {
   if (sd > 0) {
     return std::erf(std::abs(error) / (sd * std::numbers::sqrt2));
   }
-  return std::abs(error) <= kRounding ? 0 : 1;
+  return std::abs(error) <= kScoreRounding ? 0 : 1;
 }
 
 std::vector<double> Coverage(std::span<const double> errors, std::span<const double> sds,

@@ -21,8 +21,8 @@
 namespace semblance {
 namespace {
 
-constexpr Eigen::Index kFitSamples = 60;  // enough to determine three numbers; the number of modes
-                                          // grows with them
+constexpr Eigen::Index kMaternSamples = 60;  // enough to determine three numbers; the number of
+                                             // modes grows with them
 
 // The surface of the process, and the dowels on it.
 struct SurfaceScene {
@@ -95,7 +95,7 @@ SurfaceMaternHyper HyperFor(const SurfaceMatern& options, const SurfaceScene& sc
   if (options.length_mm && options.signal_mm && !options.fit_nugget) {
     return {*options.length_mm, *options.signal_mm, 0};
   }
-  const std::vector<std::size_t> some = FarthestFirst(scene.bases, 0, kFitSamples);
+  const std::vector<std::size_t> some = FarthestFirst(scene.bases, 0, kMaternSamples);
   const ReducedMatern correlations(scene.domain, DowelWeights(scene, some), SearchPoles(options),
                                    run);
   return FitHyper(options,
@@ -182,8 +182,8 @@ class SurfaceProcess {
   GaussianRegression regression_;
 };
 
-constexpr double kReach = 2.5;  // range of the length's logarithm on each side of the prior's
-                                // median
+constexpr double kLogLengthRange = 2.5;  // range of the length's logarithm on each side of the
+                                         // prior's median
 constexpr int kPoles = 8;
 
 double FittedNugget(const SurfaceMatern& options, const Eigen::VectorXd& logs) {
@@ -198,8 +198,9 @@ SurfaceMaternHyper MakeHyper(const SurfaceMatern& options, const Eigen::VectorXd
 SearchRange SearchBounds(const SurfaceMatern& options, const SurfaceMaternData& data) {
   const double prior = std::log(options.length_prior_mm);
   const double spread = std::log(DepthSpread(data.depth_mm));
-  SearchRange bounds{Vec3(prior - kReach, spread - std::log(30.0), spread - std::log(100.0)),
-                     Vec3(prior + kReach, spread + std::log(10.0), spread)};
+  SearchRange bounds{
+      Vec3(prior - kLogLengthRange, spread - std::log(30.0), spread - std::log(100.0)),
+      Vec3(prior + kLogLengthRange, spread + std::log(10.0), spread)};
   if (options.length_mm) {
     bounds.low[0] = bounds.high[0] = std::log(*options.length_mm);
   }
@@ -247,7 +248,7 @@ std::vector<double> SearchPoles(const SurfaceMatern& options) {
   }
   std::vector<double> poles;
   for (int k = 0; k < kPoles; ++k) {
-    const double log = kReach * (2.0 * k / (kPoles - 1) - 1);
+    const double log = kLogLengthRange * (2.0 * k / (kPoles - 1) - 1);
     poles.push_back(pole(options.length_prior_mm * std::exp(log)));
   }
   return poles;

@@ -13,7 +13,7 @@ namespace semblance {
 namespace {
 
 constexpr double kSameWay_mm = 1e-6;  // round-off: of two equally long paths the first counts
-constexpr double kFar = std::numeric_limits<double>::infinity();
+constexpr double kUnreached = std::numeric_limits<double>::infinity();
 
 // Divides the skull into cells. In index order, each vertex that is in no cell yet becomes the
 // center of a new one.
@@ -22,7 +22,7 @@ class Cover {
   Cover(const TriMesh& skull, double edge_mm, const RunContext& run)
       : skull_(skull),
         around_(skull),
-        way_mm_(skull.points.size(), kFar),
+        way_mm_(skull.points.size(), kUnreached),
         cell(skull.points.size(), -1) {
     for (int v = 0; v < static_cast<int>(cell.size()); ++v) {
       if (cell[v] < 0) {
@@ -133,7 +133,7 @@ CoarseSurface::CoarseSurface(const TriMesh& skull, double edge_mm, const RunCont
 CornerWeights CoarseSurface::Locate(const Vec3& p, int skull_vertex) const {
   const int center = cell_[skull_vertex];
   CornerWeights best{{center, center, center}, {1, 0, 0}};
-  double least = kFar;
+  double least = kUnreached;
   for (const int t : triangles_at_.At(center)) {
     const Triangle& corners = mesh_.triangles[t];
     const TrianglePoint on = ClosestPointOnTriangle(

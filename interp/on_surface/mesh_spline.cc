@@ -18,8 +18,7 @@ constexpr double kMinSoftness = 1e-12;  // keeps two dowels at one vertex from m
                                         // singular
 
 constexpr Eigen::Index kMaxHeld = 64;  // functions in memory at a time: 8 bytes per vertex each
-constexpr std::size_t kSolvedTogether =
-    16;  // right sides solved at a time: 8 bytes per vertex each
+constexpr std::size_t kSplineColumns = 16;  // right sides solved at a time: 8 bytes per vertex each
 
 // The local mean that a dowel prescribes: sum of weight * value, with weights of sum 1.
 struct LocalMean {
@@ -120,11 +119,11 @@ class Spline {
     const Eigen::Index n = Size();
     const bool inner_product = options_.energy == SplineEnergy::kLaplacian && n <= kMaxHeld;
     Eigen::MatrixXd held(inner_product ? laplacian_.area_mm2.size() : 0, n), kernel(n, n);
-    const std::size_t blocks = (means_.size() + kSolvedTogether - 1) / kSolvedTogether;
+    const std::size_t blocks = (means_.size() + kSplineColumns - 1) / kSplineColumns;
     ParallelFor(blocks, run.threads, 1, [&](std::size_t block) {
       run.ThrowIfStopped();
-      const auto first = static_cast<Eigen::Index>(block * kSolvedTogether);
-      const Eigen::Index count = std::min<Eigen::Index>(kSolvedTogether, n - first);
+      const auto first = static_cast<Eigen::Index>(block * kSplineColumns);
+      const Eigen::Index count = std::min<Eigen::Index>(kSplineColumns, n - first);
       const Eigen::MatrixXd right =
           Combined(Eigen::MatrixXd::Identity(n, n).middleCols(first, count));
       if (inner_product) {

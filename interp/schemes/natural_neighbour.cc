@@ -11,7 +11,8 @@
 namespace semblance {
 namespace {
 
-constexpr double kReach = 4;  // times the furthest dowel's distance; larger cells count as open
+constexpr double kOpenCellRatio =
+    4;  // times the furthest dowel's distance; larger cells count as open
 
 // For each dowel, all dowels with their distances: the nearest hundred sorted, then the rest.
 class Neighbourhoods {
@@ -135,7 +136,7 @@ DepthValue DepthAt(const std::vector<DepthSample>& samples, const Neighbourhoods
   if (normal.squaredNorm() == 0) {
     return {};  // no normal, hence no tangent plane
   }
-  NeighbourCell cell(kReach * range.furthest_mm);
+  NeighbourCell cell(kOpenCellRatio * range.furthest_mm);
   CutCell(samples, neighbourhoods, range, TangentPlane(p, normal, nearest.base), cell);
   const CellPolygon& corners = cell.shape.polygon();
   if (corners.empty() || std::ranges::count(corners, kOpenEdge, &CellCorner::edge) > 0) {

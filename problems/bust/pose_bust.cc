@@ -26,7 +26,7 @@ namespace {
 
 constexpr int kQuadsPerPatch = 4;
 constexpr double kOnFace_mm = 1;       // vertices at rest within this of the template follow it
-constexpr double kLeastCosine = 0.6;   // between normals; a smaller one lets walls follow as well
+constexpr double kBustCosine = 0.6;    // between normals; a smaller one lets walls follow as well
 constexpr double kLids = 1.45;         // lids reach to so many radii from the eyeball's centre
 constexpr double kLidTrust = 0.05;     // of the lids, so that they keep much of their shape
 constexpr double kSkullTrust = 0.1;    // of the scalp, against 1 of the face
@@ -81,7 +81,7 @@ class FaceMesh {
 std::vector<OnFace> FindOnFace(const TriMesh& mesh, const FaceMesh& face, double reach_mm,
                                std::span<const Sphere> eyes, int threads) {
   const Correspondences on_face(face.mesh(), face.normals());
-  const CorrespondenceOptions match{.reach_mm = reach_mm, .least_cosine = kLeastCosine};
+  const CorrespondenceOptions match{.reach_mm = reach_mm, .least_cosine = kBustCosine};
   const std::vector<Vec3> normals = VertexNormals(mesh);
   std::vector<OnFace> found(mesh.points.size());
   ParallelFor(mesh.points.size(), threads, 256, [&](std::size_t v) {
@@ -127,8 +127,8 @@ class Scalp {
   }
   // 1 on the scalp, 0 off it, smooth between.
   double At(const Vec3& p) const {
-    // One factor rises from 0 at 25 mm over the ears to 1 at 45 mm higher. The others rise from 0 at
-    // the ears to 1 at 20 mm outside them.
+    // One factor rises from 0 at 25 mm over the ears to 1 at 45 mm higher. The others rise from 0
+    // at the ears to 1 at 20 mm outside them.
     constexpr double kFirst_mm = 25, kWidth_mm = 45, kBeside_mm = 20;
     double part = SmoothStep((up_.dot(p - middle_) - kFirst_mm) / kWidth_mm);
     for (const Sphere& ear : ears_) {
@@ -308,7 +308,7 @@ class BustPoser {
     }
     const Scalp scalp(in_.face, in_.site_uv);
     constexpr CorrespondenceOptions kMatch = {.reach_mm = kScalpReach_mm,
-                                              .least_cosine = kLeastCosine};
+                                              .least_cosine = kBustCosine};
     const std::vector<Vec3> normals = VertexNormals(posed_);
     std::vector<SoftTarget> found(posed_.points.size());
     ParallelFor(found.size(), context_.threads, 256, [&](std::size_t v) {

@@ -27,17 +27,18 @@ using json_parts::Json;
 
 constexpr HSplineShape kShape = {
     .patches_u = 16, .patches_v = 12, .max_level = 4, .closure = Closure::kPeriodicU};
-constexpr int kSamplesPerPatch = 2;     // of the finest level, along each side
-constexpr double kTolerance_mm = 0.12;  // patches that are farther off are refined
-constexpr double kWave_mm = 1;          // smoothness halves displacements of this wavelength
-constexpr double kUnit_mm = 1e-3;       // of the written numbers
+constexpr int kHeadSamplesPerPatch = 2;     // of the finest level, along each side
+constexpr double kHeadTolerance_mm = 0.12;  // patches that are farther off are refined
+constexpr double kWave_mm = 1;              // smoothness halves displacements of this wavelength
+constexpr double kUnit_mm = 1e-3;           // of the written numbers
 
 FitOptions HeadFitOptions() {
   constexpr double kLength_mm = 10;
   const double wave = kWave_mm / (2 * std::numbers::pi * kLength_mm);
   return {
       .plan =
-          AdaptivePlan{.tolerance_mm = kTolerance_mm, .finest = kShape.max_level, .min_points = 4},
+          AdaptivePlan{
+              .tolerance_mm = kHeadTolerance_mm, .finest = kShape.max_level, .min_points = 4},
       .terms = {PointTerm{}, SmoothnessTerm{.weight = std::pow(wave, 4), .length_mm = kLength_mm}},
       .features = FreeFeatures{},
       .relaxation = NoRelaxation{},
@@ -173,8 +174,8 @@ void JoinRings(int lower, int n, int upper, int m, TriMesh& mesh) {
 WholeHeadFit FitWholeHead(const TriMesh& mesh, const std::string& name, const RunContext& context) {
   const HeadDomain domain = LayOutHead(mesh, name);
   const HeadSamples samples =
-      SampleHead(domain, kSamplesPerPatch * kShape.PatchesU(kShape.max_level),
-                 kSamplesPerPatch * kShape.PatchesV(kShape.max_level));
+      SampleHead(domain, kHeadSamplesPerPatch * kShape.PatchesU(kShape.max_level),
+                 kHeadSamplesPerPatch * kShape.PatchesV(kShape.max_level));
   const HSplineSurface start = StartSurface(kShape, samples.points, samples.uv);
   const FitResult fit =
       Fit(start, TargetOf(samples.points, samples.uv), {}, HeadFitOptions(), context);

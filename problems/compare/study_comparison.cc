@@ -19,7 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr int kLeastSubjects = 6;  // five cannot reach p < 0.05 in a two-sided test
+constexpr int kMinComparedSubjects = 6;  // five cannot reach p < 0.05 in a two-sided test
 
 // The last `parts` names of a path.
 std::string EndOf(const fs::path& path, int parts) {
@@ -126,7 +126,7 @@ TreatmentPair Pair(const ComparedTreatment& reference, const ComparedTreatment& 
     }
   }
   pair.difference = Summarize(differences);
-  if (pair.difference.n >= kLeastSubjects) {
+  if (pair.difference.n >= kMinComparedSubjects) {
     pair.test = Wilcoxon(differences);
   }
   return pair;

@@ -25,7 +25,7 @@ namespace {
 
 constexpr int kFewestMidline = 3, kFewestPairs = 2;            // as the header states
 constexpr double kSmallestScale = 0.75, kLargestScale = 1.35;  // of heads against the generic one
-constexpr double kFarthest_mm = 10;                            // of a landmark from the skin
+constexpr double kMaxPlacement_mm = 10;                        // of a landmark from the skin
 // A piece whose diagonal exceeds this part of the largest piece's may be a second head. Smaller
 // ones (eyes, hair, ears) are not reported.
 constexpr double kPieceOfHead = 0.5;
@@ -182,12 +182,12 @@ std::vector<SkinLandmark> MoveToSkin(const std::vector<SkinLandmark>& points, co
   std::vector<SkinLandmark> on_skin;
   for (const SkinLandmark& landmark : points) {
     const MeshPoint nearest = query.Closest(landmark.point);
-    if (!(nearest.distance_mm <= kFarthest_mm)) {
+    if (!(nearest.distance_mm <= kMaxPlacement_mm)) {
       throw InputError(
           fmt::format("{}: landmark '{}' is {:.1f} mm from the outer skin, and at most {} mm are "
                       "allowed; correct its point, or check that landmarks and mesh share one "
                       "frame",
-                      name, landmark.code, nearest.distance_mm, kFarthest_mm));
+                      name, landmark.code, nearest.distance_mm, kMaxPlacement_mm));
     }
     on_skin.push_back({landmark.code, nearest.position});
   }

@@ -18,20 +18,20 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 Json ToJson(const SkinDistance& d) {
-  return {{"rms_mm", Number(d.rms_mm)},
-          {"p95_mm", Number(d.p95_mm)},
-          {"max_mm", Number(d.max_mm)},
-          {"covered", Number(d.covered)},
-          {"area_mm2", Number(d.area_mm2)}};
+  return {{"rms_mm", NumberOrNull(d.rms_mm)},
+          {"p95_mm", NumberOrNull(d.p95_mm)},
+          {"max_mm", NumberOrNull(d.max_mm)},
+          {"covered", NumberOrNull(d.covered)},
+          {"area_mm2", NumberOrNull(d.area_mm2)}};
 }
 
 Json ToJson(const TemplateLevel& level) {
   return {{"level", level.level},
           {"rounds", level.rounds},
-          {"matched", Number(level.matched)},
+          {"matched", NumberOrNull(level.matched)},
           {"vertices", level.vertices},
           {"face_to_skin", ToJson(level.face_to_skin)}};
 }
@@ -40,8 +40,8 @@ Json ToJson(const TemplateSite& site) {
   return {{"u", site.uv.x()},
           {"v", site.uv.y()},
           {"from_landmark", site.from_landmark},
-          {"drift_mm", Number(site.drift_mm)},
-          {"error_mm", Number(site.error_mm)}};
+          {"drift_mm", NumberOrNull(site.drift_mm)},
+          {"error_mm", NumberOrNull(site.error_mm)}};
 }
 
 std::string DescribeDistance(const SkinDistance& d) {

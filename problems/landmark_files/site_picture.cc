@@ -18,7 +18,7 @@
 namespace semblance {
 namespace {
 
-constexpr int kWidth = 460, kHeight = 540;
+constexpr int kSiteWidth = 460, kSiteHeight = 540;
 
 void Disc(Image& image, double x, double y, double radius, const Colour& colour) {
   for (int row = static_cast<int>(y - radius) - 1; row <= static_cast<int>(y + radius) + 1; ++row) {
@@ -52,9 +52,9 @@ std::string MarkSvg(const Numbered& mark) {
 
 Numbered MarkOf(const Site& site, const Vec3& point, const Camera& camera, View view) {
   const Vec3 seen = camera.view_from_world * (point - camera.centre);
-  const double pixels = kHeight / camera.height_mm;
-  return {.x = kWidth / 2.0 + pixels * seen.x(),
-          .y = kHeight / 2.0 - pixels * seen.y(),
+  const double pixels = kSiteHeight / camera.height_mm;
+  return {.x = kSiteWidth / 2.0 + pixels * seen.x(),
+          .y = kSiteHeight / 2.0 - pixels * seen.y(),
           .left = view == View::kFront ? site.side != Side::kLeft : site.side == Side::kMidline,
           .number = site.number};
 }
@@ -77,14 +77,15 @@ std::vector<Numbered> MarksSeenFrom(View view, const Phantom& phantom, const Cam
 // One view as a group of the drawing, its left edge at x, with a caption below.
 std::string ViewSvg(View view, const char* caption, int x, const Phantom& phantom,
                     const Box3& region, int threads) {
-  const Camera camera = CameraFor(view, region, static_cast<double>(kWidth) / kHeight);
-  const Image image =
-      Render({{SkullObject(phantom.skull)}}, camera, {.width = kWidth, .height = kHeight}, threads);
+  const Camera camera = CameraFor(view, region, static_cast<double>(kSiteWidth) / kSiteHeight);
+  const Image image = Render({{SkullObject(phantom.skull)}}, camera,
+                             {.width = kSiteWidth, .height = kSiteHeight}, threads);
   std::string svg = fmt::format(
       "<g transform=\"translate({} 0)\">\n<image width=\"{}\" height=\"{}\" "
       "href=\"data:image/png;base64,{}\"/>\n<text x=\"{}\" y=\"{}\" "
       "text-anchor=\"middle\">{}</text>\n",
-      x, kWidth, kHeight, Base64(EncodePng(image)), kWidth / 2, kHeight + 22, caption);
+      x, kSiteWidth, kSiteHeight, Base64(EncodePng(image)), kSiteWidth / 2, kSiteHeight + 22,
+      caption);
   for (const Numbered& mark : MarksSeenFrom(view, phantom, camera)) {
     svg += MarkSvg(mark);
   }
@@ -221,9 +222,10 @@ std::string SitePictureSvg(int threads) {
              "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
              "height=\"{1}\" font-family=\"system-ui, sans-serif\" font-size=\"14\" "
              "fill=\"#16304f\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
-             2 * kWidth + kGap, kHeight + 34) +
+             2 * kSiteWidth + kGap, kSiteHeight + 34) +
          ViewSvg(View::kFront, "front", 0, phantom, region, threads) +
-         ViewSvg(View::kSide, "left side", kWidth + kGap, phantom, region, threads) + "</svg>\n";
+         ViewSvg(View::kSide, "left side", kSiteWidth + kGap, phantom, region, threads) +
+         "</svg>\n";
 }
 
 SiteSketch MakeSiteSketch(int threads) {

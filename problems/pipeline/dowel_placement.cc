@@ -14,12 +14,12 @@
 namespace semblance {
 namespace {
 
-constexpr double kFurthest_mm = 40;  // of the shell from a dowel's base or tip, along the dowel
+constexpr double kMaxShift_mm = 40;  // of the shell from a dowel's base or tip, along the dowel
 
 // The length of a dowel that lies under the shell; 0 if its base does not.
 double GapUnderShell(const Dowel& dowel, const TriMesh& shell, const MeshQuery& query) {
   double gap = 0;
-  for (const MeshPoint& hit : query.AllHits(dowel.base, dowel.direction, kFurthest_mm)) {
+  for (const MeshPoint& hit : query.AllHits(dowel.base, dowel.direction, kMaxShift_mm)) {
     const Triangle& t = shell.triangles[hit.triangle];
     const bool leaves = TriangleAreaVector(shell, t).dot(dowel.direction) > 0;
     gap = leaves && hit.distance_mm <= dowel.depth_mm ? std::max(gap, hit.distance_mm) : gap;
@@ -30,7 +30,7 @@ double GapUnderShell(const Dowel& dowel, const TriMesh& shell, const MeshQuery& 
 // For a dowel that ends inside the shell, the distance from its base to the first way out along it.
 // 0 for other dowels.
 double WayOut(const Dowel& dowel, const TriMesh& shell, const MeshQuery& query) {
-  const auto hit = query.FirstHit(dowel.Tip(), dowel.direction, kFurthest_mm);
+  const auto hit = query.FirstHit(dowel.Tip(), dowel.direction, kMaxShift_mm);
   const bool inside =
       hit && TriangleAreaVector(shell, shell.triangles[hit->triangle]).dot(dowel.direction) > 0;
   return inside ? dowel.depth_mm + hit->distance_mm : 0;

@@ -16,7 +16,7 @@ namespace {
 
 // Sizes in pixels: labels on the left, height of a row, names of the columns, whole map, widest
 // cell.
-constexpr double kLabels = 250, kRow = 26, kHead = 110, kLargestWidth = 900, kWidestCell = 84;
+constexpr double kMapLabels = 250, kRow = 26, kHead = 110, kLargestWidth = 900, kWidestCell = 84;
 constexpr double kNumberWidth = 40;  // a narrower cell shows no number
 constexpr double kMargin = 10;
 
@@ -60,7 +60,7 @@ std::string NumberText(double value, const Limits& limits) {
 
 std::string Cell(const HeatMap& map, std::size_t r, std::size_t c, const Limits& limits,
                  double width) {
-  const double value = map.values[r][c], x = kLabels + width * static_cast<double>(c),
+  const double value = map.values[r][c], x = kMapLabels + width * static_cast<double>(c),
                y = kHead + kRow * static_cast<double>(r);
   const std::string place = fmt::format("{} | {}: ", map.rows[r], map.columns[c]);
   if (!std::isfinite(value)) {
@@ -90,19 +90,19 @@ std::string Cell(const HeatMap& map, std::size_t r, std::size_t c, const Limits&
 std::string HeatMapSvg(const HeatMap& map) {
   const Limits limits = FindLimits(map);
   const auto columns = static_cast<double>(std::max<std::size_t>(1, map.columns.size()));
-  const double width = std::min(kWidestCell, (kLargestWidth - kLabels - 60) / columns);
+  const double width = std::min(kWidestCell, (kLargestWidth - kMapLabels - 60) / columns);
   const double bottom = kHead + kRow * static_cast<double>(map.rows.size());
   const std::string ends = limits.low <= limits.high ? fmt::format(": {:.4g} dark to {:.4g} yellow",
                                                                    limits.low, limits.high)
                                                      : "";
-  const double all = kLabels + width * columns + 60,
+  const double all = kMapLabels + width * columns + 60,
                title = kMargin + svg::TextWidth(map.title + ends) + kMargin;
   std::string text = svg::Open(bottom + 34, std::max(all, title));
   for (std::size_t c = 0; c < map.columns.size(); ++c) {
-    text += ColumnName(kLabels + width * (static_cast<double>(c) + 0.4), map.columns[c]);
+    text += ColumnName(kMapLabels + width * (static_cast<double>(c) + 0.4), map.columns[c]);
   }
   for (std::size_t r = 0; r < map.rows.size(); ++r) {
-    text += svg::Text(kLabels - 10, kHead + kRow * (static_cast<double>(r) + 0.5) + 5,
+    text += svg::Text(kMapLabels - 10, kHead + kRow * (static_cast<double>(r) + 0.5) + 5,
                       svg::Shortened(map.rows[r]), "end");
     for (std::size_t c = 0; c < map.columns.size(); ++c) {
       text += Cell(map, r, c, limits, width);

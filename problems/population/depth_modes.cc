@@ -12,8 +12,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
-constexpr int kMaxRounds = 200;
-constexpr double kTolerance_mm = 1e-6;  // change of filled depths at which the rounds end
+constexpr int kMaxModeRounds = 200;
+constexpr double kModeTolerance_mm = 1e-6;  // change of filled depths at which the rounds end
 
 struct Components {
   VectorXd variances;  // descending
@@ -62,7 +62,7 @@ Components FillAndFind(const MatrixXd& depths, const VectorXd& start, Index coun
     }
   }
   Components found;
-  for (int round = 0; round < kMaxRounds; ++round) {
+  for (int round = 0; round < kMaxModeRounds; ++round) {
     const Eigen::RowVectorXd mean = full.colwise().mean();
     found = FindComponents(full.rowwise() - mean, count);
     double moved = 0;
@@ -75,7 +75,7 @@ Components FillAndFind(const MatrixXd& depths, const VectorXd& start, Index coun
         }
       }
     }
-    if (moved < kTolerance_mm) {
+    if (moved < kModeTolerance_mm) {
       break;
     }
   }

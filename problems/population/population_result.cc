@@ -150,7 +150,7 @@ std::string ScoreLine(const Foresight& way) {
 
 using Json = nlohmann::ordered_json;
 
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+Json ScoreOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 const std::string& SubjectName(const PopulationResult& result, int row) {
   return result.subjects[result.counted[row]].person.name;
@@ -232,21 +232,21 @@ std::string DenseCsv(const DepthModes& dense) {
 Json ScoresJson(const Foresight& way) {
   const DepthScores& s = way.scores;
   return {{"points", s.points},
-          {"mae_mm", Number(s.mae_mm)},
-          {"rmse_mm", Number(s.rmse_mm)},
-          {"bias_mm", Number(s.bias_mm)},
-          {"crps_mm", Number(s.crps_mm)},
-          {"log_score", Number(s.log_score)},
-          {"interval_score_90_mm", Number(s.interval_score_90_mm)},
-          {"coverage_50", Number(s.coverage_50)},
-          {"coverage_90", Number(s.coverage_90)},
-          {"coverage_95", Number(s.coverage_95)},
-          {"mean_sd_mm", Number(s.mean_sd_mm)},
+          {"mae_mm", ScoreOrNull(s.mae_mm)},
+          {"rmse_mm", ScoreOrNull(s.rmse_mm)},
+          {"bias_mm", ScoreOrNull(s.bias_mm)},
+          {"crps_mm", ScoreOrNull(s.crps_mm)},
+          {"log_score", ScoreOrNull(s.log_score)},
+          {"interval_score_90_mm", ScoreOrNull(s.interval_score_90_mm)},
+          {"coverage_50", ScoreOrNull(s.coverage_50)},
+          {"coverage_90", ScoreOrNull(s.coverage_90)},
+          {"coverage_95", ScoreOrNull(s.coverage_95)},
+          {"mean_sd_mm", ScoreOrNull(s.mean_sd_mm)},
           {"mae_less_mean_mm",
            {{"subjects", way.against_mean_mm.n},
-            {"mean", Number(way.against_mean_mm.mean)},
-            {"low_95", Number(way.against_mean_mm.mean_95.low)},
-            {"high_95", Number(way.against_mean_mm.mean_95.high)}}}};
+            {"mean", ScoreOrNull(way.against_mean_mm.mean)},
+            {"low_95", ScoreOrNull(way.against_mean_mm.mean_95.low)},
+            {"high_95", ScoreOrNull(way.against_mean_mm.mean_95.high)}}}};
 }
 
 Json SummaryJson(const PopulationResult& result) {
@@ -259,7 +259,7 @@ Json SummaryJson(const PopulationResult& result) {
                  {"failed", result.Count("failed")},
                  {"missing", result.Count("missing")},
                  {"counted", result.counted.size()}}},
-               {"shrinkage", Number(result.joint.shrinkage)},
+               {"shrinkage", ScoreOrNull(result.joint.shrinkage)},
                {"outliers", result.outliers.size()},
                {"leave_one_out", Json::object()},
                {"modes", Json::array()},
@@ -268,7 +268,7 @@ Json SummaryJson(const PopulationResult& result) {
     json["leave_one_out"][way.name] = ScoresJson(way);
   }
   for (const double share : result.dense.share) {
-    json["modes"].push_back({{"share", Number(share)}});
+    json["modes"].push_back({{"share", ScoreOrNull(share)}});
   }
   json["libraries"] = Json::object();
   for (const auto& [name, version] : LibraryVersions()) {

@@ -63,7 +63,7 @@ void AverageSides(Index left, Index right, JointNormal& joint) {
 
 using Eigen::Index;
 
-double Rounded(double value) { return std::round(value * 1e4) / 1e4; }
+double RoundedToMicrometres(double value) { return std::round(value * 1e4) / 1e4; }
 
 // The mean depth of a landmark, over both sides of a pair.
 struct SiteMean {
@@ -94,8 +94,8 @@ TissueRow MakeRow(const Site& site, const JointSample& sample, const JointNormal
   const SiteMean mean = ComputeMean(sample, site.landmark);
   const auto own = joint.Find(site.code), twin = joint.Find(site.mirror);
   const auto at = own ? own : twin;
-  TissueCell cell{.mean = Rounded(at ? joint.mean[*at] : mean.mean_mm),
-                  .sd = at ? std::optional(Rounded(joint.sd[*at])) : std::nullopt,
+  TissueCell cell{.mean = RoundedToMicrometres(at ? joint.mean[*at] : mean.mean_mm),
+                  .sd = at ? std::optional(RoundedToMicrometres(joint.sd[*at])) : std::nullopt,
                   .n = mean.n,
                   .flag = CellFlag::kOk,
                   .note = at ? "" : "too few subjects for a standard deviation"};
@@ -110,18 +110,18 @@ TissueRow MakeRow(const Site& site, const JointSample& sample, const JointNormal
 
 TissueCorrelations MakeCorrelations(const JointSample& sample, const JointNormal& joint) {
   TissueCorrelations correlations{.subjects = static_cast<int>(sample.values.rows()),
-                                  .shrinkage = Rounded(joint.shrinkage),
+                                  .shrinkage = RoundedToMicrometres(joint.shrinkage),
                                   .covariates = {},
                                   .names = joint.names,
                                   .rows = {}};
   for (Index i = 0; i < std::ssize(joint.names); ++i) {
     if (FindSite(joint.names[i]) == nullptr) {
       correlations.covariates.push_back(
-          {joint.names[i], Rounded(joint.mean[i]), Rounded(joint.sd[i])});
+          {joint.names[i], RoundedToMicrometres(joint.mean[i]), RoundedToMicrometres(joint.sd[i])});
     }
     std::vector<double>& row = correlations.rows.emplace_back();
     for (Index j = 0; j < i; ++j) {
-      row.push_back(Rounded(joint.correlation(i, j)));
+      row.push_back(RoundedToMicrometres(joint.correlation(i, j)));
     }
   }
   return correlations;

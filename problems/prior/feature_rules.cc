@@ -15,7 +15,7 @@
 namespace semblance {
 namespace {
 
-constexpr int kFirstFeature = 28, kFeatures = 41;  // of Multi-PIE
+constexpr int kFirstFeature = 28, kRuleFeatures = 41;  // of Multi-PIE
 // The sources of these values are stated with the options.
 constexpr double kEyeBelowMargin = 0.441;  // of the orbit's height
 constexpr double kExophthalmosMm = 16.2;   // mean
@@ -182,7 +182,7 @@ std::string DescribeWrongSide(const std::string& code, const Vec3& p, const Simi
                    code, -own_mm, left ? "right" : "left");
 }
 
-bool HasMultiPie(const FacePrior& prior) { return prior.features.size() == kFeatures; }
+bool HasMultiPie(const FacePrior& prior) { return prior.features.size() == kRuleFeatures; }
 
 struct RuleEntry {
   const char* name;
@@ -253,7 +253,7 @@ std::string NoteOnPrior(const FacePrior& prior) {
   return fmt::format(
       "rules: the prior has {} landmarks, and rules need {}, nose, eyes and mouth of Multi-PIE (28 "
       "to 68): none applies; make the prior again with all of them",
-      prior.features.size(), kFeatures);
+      prior.features.size(), kRuleFeatures);
 }
 
 }  // namespace

@@ -183,7 +183,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kFormat = "semblance face prior";
+constexpr const char* kModesFormat = "semblance face prior";
 constexpr double kUnitMm = 0.001;  // of the written numbers
 
 Vec3 ValueAt(const ControlNet& net, const Stencil& stencil) {
@@ -256,8 +256,8 @@ ControlNet NetFrom(const Json& json, const HSplineShape& shape, int level) {
 }
 
 HSplineModes ModesFrom(const Json& json) {
-  if (json.at("format") != kFormat || json.at("version") != 1) {
-    throw InputError(fmt::format("format and version must be \"{}\" and 1", kFormat));
+  if (json.at("format") != kModesFormat || json.at("version") != 1) {
+    throw InputError(fmt::format("format and version must be \"{}\" and 1", kModesFormat));
   }
   HSplineModes modes;
   constexpr int kLimit = 4096;  // keeps the conversion exact; CheckShape checks the shape itself
@@ -356,7 +356,7 @@ HSplineModes ModesOnTemplate(const FacePrior& prior, const PriorOnTemplate& on_t
 }
 
 std::string HSplineModesToJson(const HSplineModes& modes) {
-  Json json{{"format", kFormat},
+  Json json{{"format", kModesFormat},
             {"version", 1},
             {"patches_u", modes.shape.patches_u},
             {"patches_v", modes.shape.patches_v},

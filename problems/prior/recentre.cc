@@ -18,7 +18,7 @@
 namespace semblance {
 namespace {
 
-Vec3 Mirrored(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
+Vec3 MirroredInX(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
 
 // ---------------------------------------------------------------------------------------------
 // Sites
@@ -62,7 +62,7 @@ struct Places {
   double weight = 0;
 
   void Add(const Site& site, const Vec3& place, double w) {
-    sum += w * (site.side == Side::kRight ? Mirrored(place) : place);
+    sum += w * (site.side == Side::kRight ? MirroredInX(place) : place);
     weight += w;
   }
 };
@@ -91,7 +91,7 @@ std::map<std::string, Vec3> MeanSites(const FacePrior& prior,
     all.Add(site, PositionOf(own->second, prior.model.mean, prior.model.mean.points), site_prior);
     Vec3 place = all.sum / all.weight;
     place.x() *= site.side == Side::kMidline ? 0 : 1;
-    sites[site.code] = site.side == Side::kRight ? Mirrored(place) : place;
+    sites[site.code] = site.side == Side::kRight ? MirroredInX(place) : place;
   }
   return sites;
 }
@@ -145,7 +145,7 @@ std::vector<int> Partners(const TriMesh& mean, const RunContext& context) {
   const MeshQuery query(mean);
   std::vector<int> partner(mean.points.size(), -1);
   ParallelFor(partner.size(), context.threads, 256, [&](std::size_t v) {
-    const MeshPoint at = query.Closest(Mirrored(mean.points[v]));
+    const MeshPoint at = query.Closest(MirroredInX(mean.points[v]));
     int corner = 0;
     at.weights.maxCoeff(&corner);
     partner[v] = mean.triangles[at.triangle][corner];

@@ -24,7 +24,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 namespace fs = std::filesystem;
 
-constexpr int kWidth = 420, kHeight = 520;  // pixels of a picture
+constexpr int kSheetWidth = 420, kSheetHeight = 520;  // pixels of a picture
 
 bool IsName(const std::string& name) {
   return !name.empty() && name.size() <= 60 && std::ranges::all_of(name, [](unsigned char c) {
@@ -234,9 +234,9 @@ class ComparedPictures {
 
  private:
   Image Picture(const Scene& scene, View view, const Box3& region, Lighting lighting) const {
-    const double aspect = static_cast<double>(kWidth) / kHeight;
+    const double aspect = static_cast<double>(kSheetWidth) / kSheetHeight;
     return Render(scene, CameraFor(view, region, aspect),
-                  {.width = kWidth, .height = kHeight, .lighting = lighting}, threads_);
+                  {.width = kSheetWidth, .height = kSheetHeight, .lighting = lighting}, threads_);
   }
   void Write(const std::string& name, const std::vector<Image>& pictures) {
     folder_.Write(fmt::format("pictures/alternatives_{}.png", name),

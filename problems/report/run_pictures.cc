@@ -11,7 +11,7 @@ namespace semblance {
 namespace {
 
 constexpr std::array kViews = {View::kFront, View::kThreeQuarter, View::kSide};
-constexpr int kWidth = 560, kHeight = 640;
+constexpr int kPictureWidth = 560, kPictureHeight = 640;
 
 // The box that all pictures frame: skull, face and dowels.
 Box3 Region(const RunResult& result) {
@@ -31,8 +31,8 @@ Box3 Region(const RunResult& result) {
   return box;
 }
 
-RenderOptions Options(Lighting lighting) {
-  return {.width = kWidth, .height = kHeight, .lighting = lighting};
+RenderOptions PictureOptions(Lighting lighting) {
+  return {.width = kPictureWidth, .height = kPictureHeight, .lighting = lighting};
 }
 
 // The state that the sheets of one run share.
@@ -41,7 +41,7 @@ struct Album {
   OutputFolder& folder;
   int threads;
   std::vector<Camera> cameras =
-      CamerasFor(kViews, Region(result), static_cast<double>(kWidth) / kHeight);
+      CamerasFor(kViews, Region(result), static_cast<double>(kPictureWidth) / kPictureHeight);
   ShadowMaps of_skull = {}, of_face = {}, of_skin = {};
 };
 
@@ -49,7 +49,7 @@ struct Album {
 Image WriteSheet(const char* name, const Scene& scene, Lighting lighting, ShadowMaps& shadows,
                  Album& album) {
   std::vector<Image> sides =
-      RenderAll(scene, album.cameras, Options(lighting), shadows, album.threads);
+      RenderAll(scene, album.cameras, PictureOptions(lighting), shadows, album.threads);
   album.folder.Write(name, EncodePng(ContactSheet(sides)));
   return std::move(sides.front());
 }
@@ -61,7 +61,7 @@ Scene SkullScene(const RunResult& result) {
 // Writes the head framed by itself. Returns it from the front in the frame of the other pictures.
 Image WriteBust(Album& album) {
   const Scene head = HeadScene(album.result);
-  const RenderOptions options = Options(Lighting::kStudio);
+  const RenderOptions options = PictureOptions(Lighting::kStudio);
   album.folder.Write("pictures/bust.png",
                      EncodePng(RenderViews(head, Bounds(album.result.bust->skin), kViews, options,
                                            album.threads)));

@@ -32,7 +32,7 @@ Json MapJson(const ColourMap& map, const char* title) {
           {"colours", ColourSteps(map)}};
 }
 
-Json Numbers(const Vec3& p) {
+Json RoundedPointJson(const Vec3& p) {
   const auto rounded = [](double x) { return std::round(1000 * x) / 1000; };
   return {rounded(p.x()), rounded(p.y()), rounded(p.z())};
 }
@@ -180,12 +180,12 @@ class SceneWriter {
       }
       Json json = {{"site", dowel.site},
                    {"name", WordsOfSite(dowel.site)},
-                   {"base", Numbers(dowel.base)},
-                   {"tip", Numbers(dowel.Tip())},
+                   {"base", RoundedPointJson(dowel.base)},
+                   {"tip", RoundedPointJson(dowel.Tip())},
                    {"depth_mm", dowel.depth_mm}};
       for (std::size_t k = 0; k < result_.target.points.size(); ++k) {
         if (result_.target.points[k].label == dowel.site) {
-          json["on_face"] = Numbers(result_.fit.surface.Point(result_.fit.uv[k]));
+          json["on_face"] = RoundedPointJson(result_.fit.surface.Point(result_.fit.uv[k]));
           json["residual_mm"] = result_.fit.residual_mm[k];
         }
       }

@@ -17,9 +17,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+Json FiniteOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-Json Numbers(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+Json PointJson(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
 Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
   Json json = {{"site", l.site},
@@ -29,9 +29,9 @@ Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
                {"proposed", l.proposed}};
   json["depth_along_normal_mm"] = l.depth_along_normal_mm ? Json(*l.depth_along_normal_mm) : Json();
   if (const auto at = checks.sites.find(l.site); at != checks.sites.end()) {
-    json["from_bone_mm"] = Number(at->second.from_bone_mm);
-    json["from_predicted_mm"] = Number(at->second.from_predicted_mm);
-    json["from_mirror_mm"] = Number(at->second.from_mirror_mm);
+    json["from_bone_mm"] = FiniteOrNull(at->second.from_bone_mm);
+    json["from_predicted_mm"] = FiniteOrNull(at->second.from_predicted_mm);
+    json["from_mirror_mm"] = FiniteOrNull(at->second.from_mirror_mm);
   }
   return json;
 }
@@ -48,7 +48,7 @@ Json SubjectJson(const Bench::Snapshot& shot) {
                {"notes", subject.notes}};
   if (!subject.skull.mesh.points.empty()) {
     const Box3 box = Bounds(subject.skull.mesh);
-    json["size_mm"] = Numbers(box.sizes());
+    json["size_mm"] = PointJson(box.sizes());
   }
   return json;
 }
@@ -72,15 +72,15 @@ Json JobJson(const JobStatus& job) {
   return {{"name", job.name},
           {"state", JobWord(job.state)},
           {"step", job.step},
-          {"fraction", Number(job.fraction)},
-          {"seconds", Number(job.seconds)},
+          {"fraction", FiniteOrNull(job.fraction)},
+          {"seconds", FiniteOrNull(job.seconds)},
           {"words", job.words}};
 }
 
 Json PredictedJson(const LandmarkChecks& checks) {
   Json json = Json::array();
   for (const auto& [site, point] : checks.predicted) {
-    json.push_back({{"site", site}, {"point", Numbers(point)}});
+    json.push_back({{"site", site}, {"point", PointJson(point)}});
   }
   return json;
 }
@@ -96,10 +96,10 @@ Json DowelsJson(const std::vector<Dowel>& dowels) {
   for (const Dowel& dowel : dowels) {
     if (dowel.Tip().allFinite()) {
       json.push_back({{"site", dowel.site},
-                      {"base", Numbers(dowel.base)},
-                      {"tip", Numbers(dowel.Tip())},
+                      {"base", PointJson(dowel.base)},
+                      {"tip", PointJson(dowel.Tip())},
                       {"depth_mm", dowel.depth_mm},
-                      {"sd_mm", Number(dowel.sd_mm)}});
+                      {"sd_mm", FiniteOrNull(dowel.sd_mm)}});
     }
   }
   return json;
@@ -113,7 +113,7 @@ Json SiteJson(const Site& site) {
                {"definition", SiteDefinition(site.landmark)},
                {"standard", IsStandardSite(site.code)}};
   if (IsStandardSite(site.code)) {
-    json["average"] = Numbers(AverageSite(site.code));
+    json["average"] = PointJson(AverageSite(site.code));
   }
   return json;
 }
@@ -161,7 +161,7 @@ std::string FaceJson(const BenchFace& face) {
               {"dowels", DowelsJson(face.dowels)},
               {"notes", face.notes},
               {"finest_level", face.surface.shape().max_level},
-              {"seconds", Number(face.seconds)}}
+              {"seconds", FiniteOrNull(face.seconds)}}
       .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

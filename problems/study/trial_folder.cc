@@ -31,7 +31,7 @@ Json ParsedOrNull(const fs::path& file) {
   }
 }
 
-bool Exists(const fs::path& file) {
+bool FileExists(const fs::path& file) {
   std::error_code ignored;
   return fs::exists(file, ignored);
 }
@@ -60,7 +60,7 @@ std::string FindHashFault(const fs::path& trial, std::span<const fs::path> files
 std::string FindFileFault(const fs::path& trial, std::span<const fs::path> files,
                           const Json& trial_json) {
   const std::string fault = FindHashFault(trial, files, trial_json.value("files", Json()));
-  const Json manifest = fault.empty() && Exists(trial / "manifest.json")
+  const Json manifest = fault.empty() && FileExists(trial / "manifest.json")
                             ? ParsedOrNull(trial / "manifest.json")
                             : Json::object();
   if (!fault.empty() || !manifest.is_object()) {
@@ -182,7 +182,7 @@ fs::path TrialFolder(const fs::path& study, const std::string& id) { return stud
 
 std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) {
   const fs::path file = TrialFolder(study, id) / kTrialFile;
-  if (!Exists(file)) {
+  if (!FileExists(file)) {
     return std::nullopt;
   }
   Json json = ParsedOrNull(file);
@@ -193,7 +193,7 @@ std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) 
 
 StoredPlan ReadStoredPlan(const fs::path& study) {
   const fs::path file = study / "plan.json";
-  if (!Exists(file)) {
+  if (!FileExists(file)) {
     return {};
   }
   const Json json = ParsedOrNull(file);

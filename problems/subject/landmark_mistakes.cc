@@ -22,7 +22,8 @@ namespace {
 // Median residual up to which sites can be those of a skull. The three measured skulls differ by up
 // to 8 mm; a lower limit would take odd skulls for mistakes, a higher one would miss mistakes.
 constexpr double kMaxMedianResidual_mm = 12;
-constexpr double kMinScale = 0.7, kMaxScale = 1.4;  // size of a skull relative to the average one
+constexpr double kMinSkullScale = 0.7,
+                 kMaxSkullScale = 1.4;  // size of a skull relative to the average one
 
 // The landmarks' points, standard sites first.
 std::vector<SitePoint> StandardFirst(const LandmarkFile& file) {
@@ -163,7 +164,7 @@ class MistakeSearch {
 
   bool HasSkullSize(double factor = 1) const {
     const double scale = factor * fit_->skull_from_average.scale;
-    return scale >= kMinScale && scale <= kMaxScale;
+    return scale >= kMinSkullScale && scale <= kMaxSkullScale;
   }
 
   bool HasAnotherFrame() {
@@ -208,7 +209,7 @@ class MistakeSearch {
            Error(
                "the skull is {:.2f} times as large as an average one ({} to {} are allowed); check "
                "the unit of skull and landmarks, and the voxels' size",
-               fit_->skull_from_average.scale, kMinScale, kMaxScale);
+               fit_->skull_from_average.scale, kMinSkullScale, kMaxSkullScale);
   }
 
   bool HasWrongPose() {

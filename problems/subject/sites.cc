@@ -23,7 +23,7 @@ struct StandardLandmark {
   bool paired;
 };
 
-constexpr StandardLandmark kLandmarks[] = {
+constexpr StandardLandmark kSiteRows[] = {
     {1, "sg", "Supraglabella", false},
     {2, "g", "Glabella", false},
     {3, "n", "Nasion", false},
@@ -190,7 +190,7 @@ NamedSite UnknownName(std::string_view name) {
 }  // namespace
 
 const std::vector<Site>& StandardSites() {
-  static const std::vector<Site> sites = MakeSites(kLandmarks);
+  static const std::vector<Site> sites = MakeSites(kSiteRows);
   return sites;
 }
 

@@ -107,7 +107,7 @@ std::string Indices(std::span<const Tuple> tuples, std::size_t points) {
 }
 
 // Decodes unsigned numbers of `width` bytes each.
-std::vector<std::uint32_t> Numbers(const std::string& base64, std::size_t width) {
+std::vector<std::uint32_t> ReadBlobNumbers(const std::string& base64, std::size_t width) {
   const std::string bytes = FromBase64(base64);
   std::vector<std::uint32_t> numbers(bytes.size() / width, 0);
   for (std::size_t k = 0; k < numbers.size() * width; ++k) {
@@ -151,7 +151,7 @@ Json BlobOfMesh(const TriMesh& mesh) {
 }
 
 TriMesh MeshOfBlob(const Json& blob) {
-  const auto numbers = Numbers(blob.at("points").get<std::string>(), 2);
+  const auto numbers = ReadBlobNumbers(blob.at("points").get<std::string>(), 2);
   const double step = blob.at("step").get<double>();
   TriMesh mesh;
   mesh.points.assign(numbers.size() / 3, Vec3::Zero());
@@ -160,7 +160,7 @@ TriMesh MeshOfBlob(const Json& blob) {
     mesh.points[k / 3][axis] = blob.at("low").at(k % 3).get<double>() + step * numbers[k];
   }
   const bool narrow = mesh.points.size() <= 65536;
-  const auto corners = Numbers(blob.at("triangles").get<std::string>(), narrow ? 2 : 4);
+  const auto corners = ReadBlobNumbers(blob.at("triangles").get<std::string>(), narrow ? 2 : 4);
   mesh.triangles.resize(corners.size() / 3);
   for (std::size_t k = 0; k < 3 * mesh.triangles.size(); ++k) {
     if (corners[k] >= mesh.points.size()) {

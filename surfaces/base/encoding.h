@@ -2,6 +2,7 @@
 // Bytes in other forms: Base64 text, SHA-256 digests, and gzip.
 #pragma once
 
+#include <bit>
 #include <concepts>
 #include <cstddef>
 #include <filesystem>
@@ -57,6 +58,14 @@ void AppendLittleEndian(std::string& bytes, Integer value) {
   for (std::size_t k = 0; k < sizeof(Integer); ++k) {
     bytes += static_cast<char>(value >> (8 * k) & 0xFF);
   }
+}
+
+// Appends the bytes of a number as they are in memory; a machine that stores the highest byte first
+// is refused at compile time.
+template <class T>
+void AppendRaw(std::string& bytes, T value) {
+  static_assert(std::endian::native == std::endian::little);
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
 }  // namespace semblance

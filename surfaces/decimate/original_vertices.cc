@@ -18,7 +18,7 @@ constexpr int kSettleRounds = 2;
 constexpr double kSettleShare = 0.5;
 // Holds a point in directions in which no triangle faces.
 constexpr double kSettleDamping = 0.01;
-constexpr double kMostTurnCosine = 0.5;  // 60 degrees, as in a collapse
+constexpr double kMinTurnCosine = 0.5;  // 60 degrees, as in a collapse
 
 // The pull of the original vertices on a point, as the normal equations of sum (h - w n . step)^2.
 // Here n is a triangle's normal, h the height of an original vertex over its plane, and w the
@@ -68,8 +68,8 @@ void AddPulls(const TriMesh& original, const std::vector<std::int32_t>& pulling,
   }
 }
 
-bool TurnsFar(const Vec3& before, const Vec3& after) {
-  return before.dot(after) < kMostTurnCosine * before.norm() * after.norm();
+bool TurnsTooFar(const Vec3& before, const Vec3& after) {
+  return before.dot(after) < kMinTurnCosine * before.norm() * after.norm();
 }
 
 // Moves points back until no triangle turns far.
@@ -78,7 +78,7 @@ void UndoFarTurns(const std::vector<Vec3>& before, TriMesh& mesh) {
   for (bool more = true; more;) {
     more = false;
     for (const Triangle& t : mesh.triangles) {
-      if (TurnsFar(TriangleAreaVector(was, t), TriangleAreaVector(mesh, t))) {
+      if (TurnsTooFar(TriangleAreaVector(was, t), TriangleAreaVector(mesh, t))) {
         for (const std::int32_t v : t) {
           more = more || mesh.points[v] != before[v];
           mesh.points[v] = before[v];

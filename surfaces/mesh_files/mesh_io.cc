@@ -9,6 +9,7 @@
 #include <set>
 
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 #include "surfaces/mesh_files/read_obj.h"
@@ -37,14 +38,6 @@ TriMesh Decode(std::string_view bytes, const std::string& extension, const std::
          : extension == ".obj" ? ReadObj(bytes, name)
          : extension == ".off" ? ReadOff(bytes, name)
                                : ReadStl(bytes, name);
-}
-
-template <class T>
-void AppendRaw(std::string& bytes, T value) {
-  static_assert(std::endian::native == std::endian::little);
-  char raw[sizeof(T)];
-  std::memcpy(raw, &value, sizeof(T));
-  bytes.append(raw, sizeof(T));
 }
 
 enum class Precision { kSingle, kDouble };

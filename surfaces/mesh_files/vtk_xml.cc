@@ -27,13 +27,6 @@ constexpr const char* kVtkType<std::int64_t> = "Int64";
 template <>
 constexpr const char* kVtkType<std::uint8_t> = "UInt8";
 
-// Little-endian, as the head of the file states.
-template <class T>
-void AppendRaw(std::string& bytes, T value) {
-  static_assert(std::endian::native == std::endian::little);
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
 // One array as Base64: its size in bytes, then its numbers.
 template <class T>
 std::string ArrayXml(const std::string& name, int components, const std::vector<T>& numbers) {
