@@ -214,7 +214,7 @@ class Fitter {
   // Runs a plan that fits level by level once.
   template <class Plan>
   void Follow(const Plan& plan) {
-    const std::vector<ScheduleStep> steps = StepsOf(plan);
+    const std::vector<ScheduleStep> steps = PlanSteps(plan);
     FollowPasses(steps, /*passes=*/1, /*least_gain_mm=*/0, plan.sweeps);
   }
 
@@ -259,7 +259,7 @@ class Fitter {
 
   LevelView View(int level, const FitTarget& target) const {
     return MakeLevelView(result_.surface, rest_, target, level,
-                         {.aim = AimOf(options_.plan), .held = Held()});
+                         {.aim = PlanAim(options_.plan), .held = Held()});
   }
 
   LevelSummary SolveLevel(const ScheduleStep& step, std::span<const Term> terms,

@@ -187,7 +187,7 @@ void FaceJob::LoadTemplateAndPrior() {
                                     [&source] { return LoadTemplate(source); });
   });
   prior_ =
-      step_("load prior", [&] { return GivenPrior(experiment_, *generic_, cache_, context_); });
+      step_("load prior", [&] { return LoadExperimentPrior(experiment_, *generic_, cache_, context_); });
   Append(TemplateFiles(source), subject_.inputs);
   Append(prior_ ? PriorFiles(experiment_.prior) : Files(), subject_.inputs);
 }

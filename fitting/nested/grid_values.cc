@@ -96,7 +96,7 @@ Columns RunColumns(const GridRun& run, const GridLayout& layout) {
 std::array<int, 4> PatchRowsAround(const PatchGrid& grid, int row) {
   std::array<int, 4> rows;
   for (int b = 0; b < 4; ++b) {
-    rows[b] = PlaceAmong(grid.patches_v, row - 3 + b, false);
+    rows[b] = WrapIndex(grid.patches_v, row - 3 + b, false);
   }
   return rows;
 }

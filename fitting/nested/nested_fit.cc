@@ -165,7 +165,7 @@ std::map<VertexId, std::optional<Vec3>> MakeOffsets(const NestedSpace& space, in
         continue;
       }
       const VertexId vertex{level, i, j};
-      const SurfaceFrame frame = surface.LevelFrame(level - 1, surface.ParameterOf(vertex));
+      const SurfaceFrame frame = surface.LevelFrame(level - 1, surface.GrevillePoint(vertex));
       const Vec3 way = rest.At(i, j) + InSpace(points, displacements, i, j) - frame.point;
       offsets.emplace_hint(offsets.end(), vertex, world ? way : Vec3(frame.axes.transpose() * way));
     }

@@ -136,9 +136,9 @@ bool NestedSpace::IsCovered(int level, int i, int j) const {
   }
   const GridLayout& finer = levels_[level + 1].layout;
   for (int b = 2 * j - 3; b <= 2 * j + 1; ++b) {
-    const int row = PlaceAmong(finer.grid.Rows(), b, false);
+    const int row = WrapIndex(finer.grid.Rows(), b, false);
     for (int a = 2 * i - 3; row >= 0 && a <= 2 * i + 1; ++a) {
-      const int column = PlaceAmong(finer.grid.Columns(), a, finer.grid.periodic_u);
+      const int column = WrapIndex(finer.grid.Columns(), a, finer.grid.periodic_u);
       if (column >= 0 && levels_[level + 1].active[finer.At(column, row)] == 0) {
         return false;
       }

@@ -181,7 +181,7 @@ std::vector<char> DetectPatches(const GridLayout& layout, const GridLayout& coar
     std::fill(together.begin(), together.end(), 0.0);
     std::fill(apart.begin(), apart.end(), 0.0);
     for (int b = 2 * j; b <= 2 * j + 4; ++b) {
-      const int row = PlaceAmong(layout.grid.Rows(), b, false);
+      const int row = WrapIndex(layout.grid.Rows(), b, false);
       if (row >= 0) {
         AddWindows(layout, evidence.together, row, together);
         AddWindows(layout, evidence.apart, row, apart);

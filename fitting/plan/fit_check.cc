@@ -225,14 +225,14 @@ class FaultFinder {
 
 }  // namespace
 
-std::vector<FitFault> FaultsOf(const FitOptions& options, int max_level) {
+std::vector<FitFault> FindFitFaults(const FitOptions& options, int max_level) {
   return FaultFinder(options, max_level).Take();
 }
 
 namespace {
 
 void CheckOptions(const FitOptions& options, int max_level) {
-  for (const FitFault& fault : FaultsOf(options, max_level)) {
+  for (const FitFault& fault : FindFitFaults(options, max_level)) {
     Fail(fmt::format("{}: {}", fault.path, fault.what));
   }
 }
@@ -249,9 +249,9 @@ void CheckExact(std::span<const ExactPoint> exact, const FitOptions& options) {
         "exact points need plan: auto or adaptive, solver: fastest, terms that treat x, y and z "
         "alike, and relaxation: none");
   }
-  if (exact.size() > kMostExactPoints) {
+  if (exact.size() > kMaxExactPoints) {
     Fail(fmt::format("{} exact points are more than {}; leave some out", exact.size(),
-                     kMostExactPoints));
+                     kMaxExactPoints));
   }
   for (const ExactPoint& point : exact) {
     if (!point.position.allFinite() || !point.normal.allFinite() ||

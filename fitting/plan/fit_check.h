@@ -21,7 +21,7 @@ struct FitFault {
 
 // Returns the options that contradict each other, or that do not suit a surface whose finest level
 // is max_level: everything that Fit refuses for any points and features.
-std::vector<FitFault> FaultsOf(const FitOptions& options, int max_level);
+std::vector<FitFault> FindFitFaults(const FitOptions& options, int max_level);
 
 // Returns one line per option that is given but has no effect, with its path as above. This is no
 // fault: a study may compare several losses, `none` among them, at one width.

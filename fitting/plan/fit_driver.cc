@@ -116,10 +116,10 @@ FitDriver::FitDriver(const HSplineSurface& rest, const FitTarget& target, const 
                   ? kNaN
                   : PointRms(result.surface, target, context.threads)),
       rounds_(CountFurtherSolves(options.relaxation)),
-      moves_(MovesOf(options.relaxation)) {
+      moves_(EffectiveMoves(options.relaxation)) {
   if (moves_) {
     moved_ = target;
-    mesh_.emplace(NetworkOf(rest, target, *moves_));
+    mesh_.emplace(MakeNetwork(rest, target, *moves_));
   }
 }
 
@@ -199,7 +199,7 @@ RelaxationSummary FitDriver::MoveJointly(const FitStep& step) {
     SetWeight(result_.levels.back().auto_weight, terms[automatic]);
   }
   const bool detail =
-      AimOf(options_.plan) == FitAim::kSurface && step.level < result_.surface.shape().max_level;
+      PlanAim(options_.plan) == FitAim::kSurface && step.level < result_.surface.shape().max_level;
   const JointLevel level{
       .view = step.view(moved_),
       .terms = terms,

@@ -5,7 +5,7 @@
 
 namespace semblance {
 
-std::vector<ScheduleStep> StepsOf(const SchedulePlan& plan) {
+std::vector<ScheduleStep> PlanSteps(const SchedulePlan& plan) {
   std::vector<ScheduleStep> steps;
   if (const auto* const list = std::get_if<ListedPlan>(&plan)) {
     steps = list->schedule;
@@ -19,7 +19,7 @@ std::vector<ScheduleStep> StepsOf(const SchedulePlan& plan) {
   return steps;
 }
 
-FitAim AimOf(const SchedulePlan& plan) {
+FitAim PlanAim(const SchedulePlan& plan) {
   return std::visit(
       []<class Plan>(const Plan& p) {
         if constexpr (std::is_same_v<Plan, AdaptivePlan> || std::is_same_v<Plan, AutoPlan>) {
@@ -31,10 +31,10 @@ FitAim AimOf(const SchedulePlan& plan) {
       plan);
 }
 
-int FinestLevelOf(const SchedulePlan& plan) {
+int FinestPlanLevel(const SchedulePlan& plan) {
   const auto* const adaptive = std::get_if<AdaptivePlan>(&plan);
   int finest = adaptive != nullptr ? adaptive->finest : 0;
-  for (const ScheduleStep& step : StepsOf(plan)) {
+  for (const ScheduleStep& step : PlanSteps(plan)) {
     finest = std::max(finest, step.level);
   }
   return finest;
@@ -42,8 +42,8 @@ int FinestLevelOf(const SchedulePlan& plan) {
 
 int FinestAllowed(const SchedulePlan& plan, const HSplineShape& shape) {
   const auto* const automatic = std::get_if<AutoPlan>(&plan);
-  int finest = automatic != nullptr ? automatic->finest : FinestLevelOf(plan);
-  while (finest > 0 && (std::max(shape.patches_u, shape.patches_v) << finest) > kMostPatches) {
+  int finest = automatic != nullptr ? automatic->finest : FinestPlanLevel(plan);
+  while (finest > 0 && (std::max(shape.patches_u, shape.patches_v) << finest) > kMaxPatches) {
     --finest;
   }
   return std::max(finest, shape.max_level);

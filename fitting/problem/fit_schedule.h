@@ -252,13 +252,13 @@ constexpr auto EnumNames(Solver) { return std::to_array<std::string_view>({"cere
 using SchedulePlan = std::variant<ListedPlan, CoarseToFinePlan, UntilPlan, AdaptivePlan, AutoPlan>;
 
 // The steps of one pass of a plan that fits level by level; empty for the plans adaptive and auto.
-std::vector<ScheduleStep> StepsOf(const SchedulePlan& plan);
+std::vector<ScheduleStep> PlanSteps(const SchedulePlan& plan);
 // The aim of a plan's levels; kSurface for the plans adaptive and auto.
-FitAim AimOf(const SchedulePlan& plan);
+FitAim PlanAim(const SchedulePlan& plan);
 // The finest level that a plan names; 0 for the auto plan, which uses as many levels as it needs.
-int FinestLevelOf(const SchedulePlan& plan);
+int FinestPlanLevel(const SchedulePlan& plan);
 // The finest level that the plan may give a surface of this shape. The auto plan's `finest` is
-// lowered until the level has at most kMostPatches patches along each side.
+// lowered until the level has at most kMaxPatches patches along each side.
 int FinestAllowed(const SchedulePlan& plan, const HSplineShape& shape);
 
 }  // namespace semblance

@@ -44,7 +44,7 @@ struct ExactPoint {
 
 // Most exact points of a fit. Their equations are solved as one dense system, which takes cubic
 // time.
-inline constexpr std::size_t kMostExactPoints = 500;
+inline constexpr std::size_t kMaxExactPoints = 500;
 
 struct FitTarget {
   std::vector<FitPoint> points;

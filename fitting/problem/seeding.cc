@@ -149,8 +149,8 @@ bool Reversed(const Seed& a, const Seed& b) {
 // Counts the neighbours (of four) that have changed places with patch (i, j).
 int CountReversed(const std::vector<Seed>& seeds, const Patches& patches, int i, int j) {
   const auto at = [&](int a, int b) -> const Seed* {
-    a = PlaceAmong(patches.u, a, patches.periodic_u);
-    b = PlaceAmong(patches.v, b, false);
+    a = WrapIndex(patches.u, a, patches.periodic_u);
+    b = WrapIndex(patches.v, b, false);
     return a >= 0 && b >= 0 ? &seeds[a + patches.u * b] : nullptr;
   };
   const Seed& seed = *at(i, j);

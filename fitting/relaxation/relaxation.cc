@@ -311,7 +311,7 @@ void MovePoints(const HSplineSurface& surface, const std::vector<Vec2>& uv, FitT
   }
 }
 
-std::optional<NetworkMoves> MovesOf(const Relaxation& relaxation) {
+std::optional<NetworkMoves> EffectiveMoves(const Relaxation& relaxation) {
   return std::visit(
       []<class R>(const R& chosen) -> std::optional<NetworkMoves> {
         if constexpr (std::is_base_of_v<NetworkMoves, R>) {
@@ -325,7 +325,7 @@ std::optional<NetworkMoves> MovesOf(const Relaxation& relaxation) {
       relaxation);
 }
 
-DowelMesh NetworkOf(const HSplineSurface& rest, const FitTarget& target,
+DowelMesh MakeNetwork(const HSplineSurface& rest, const FitTarget& target,
                     const NetworkMoves& moves) {
   std::vector<Vec2> uv;
   for (const FitPoint& p : target.points) {

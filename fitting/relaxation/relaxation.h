@@ -143,11 +143,11 @@ using Relaxation = std::variant<NoRelaxation, FootpointRelaxation, AlternatingRe
 
 // The moves of a relaxation, with zero weights for penalties that its mode ignores; nothing for
 // NoRelaxation.
-std::optional<NetworkMoves> MovesOf(const Relaxation& relaxation);
+std::optional<NetworkMoves> EffectiveMoves(const Relaxation& relaxation);
 
 // Makes the network of the points in the template. It has links only if the barrier or a weight
 // needs them.
-DowelMesh NetworkOf(const HSplineSurface& rest, const FitTarget& target, const NetworkMoves& moves);
+DowelMesh MakeNetwork(const HSplineSurface& rest, const FitTarget& target, const NetworkMoves& moves);
 
 // Mean penalties without their weights, mm^2. a and b are neighbours, and d is their distance in
 // the template.

@@ -463,7 +463,7 @@ ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
   result.subject_from_model = MakeSimilarity(frame_, parameters_);
   result.coefficients = parameters_.coefficients;
   result.points = placed_.points;
-  if (target_.tells_spread) {
+  if (target_.compute_spread) {
     ComputeSpread(context, result);
   }
   for (const ShapeTip& tip : target_.tips) {

@@ -26,8 +26,8 @@ std::vector<VertexId> MissingOver(const HierarchicalSplineSpace& space, const Pa
   std::vector<VertexId> missing;
   for (int b = first(patch.j, false); b <= last_v; ++b) {
     for (int a = first(patch.i, shape.ClosedU()); a <= last_u; ++a) {
-      const VertexId vertex{level, PlaceAmong(shape.Columns(level), a, shape.ClosedU()),
-                            PlaceAmong(shape.Rows(level), b, false)};
+      const VertexId vertex{level, WrapIndex(shape.Columns(level), a, shape.ClosedU()),
+                            WrapIndex(shape.Rows(level), b, false)};
       if (vertex.i >= 0 && vertex.j >= 0 && !space.IsEdited(vertex)) {
         missing.push_back(vertex);
       }
@@ -53,8 +53,8 @@ class PatchCounts {
     for (int k = 0; k < 9; ++k) {
       const PatchId other{
           patch.level,
-          PlaceAmong(shape_.PatchesU(patch.level), patch.i + k % 3 - 1, shape_.ClosedU()),
-          PlaceAmong(shape_.PatchesV(patch.level), patch.j + k / 3 - 1, false)};
+          WrapIndex(shape_.PatchesU(patch.level), patch.i + k % 3 - 1, shape_.ClosedU()),
+          WrapIndex(shape_.PatchesV(patch.level), patch.j + k / 3 - 1, false)};
       const auto found = counts_.find(MakeKey(other));
       if (found != counts_.end() && 4 * found->second < own) {
         emptier.push_back(other);

@@ -149,8 +149,8 @@ void HierarchicalSplineSpace::Edit(std::span<const VertexId> vertices) {
     AddDof(v, Vec3::Zero());
     for (int k = 0; k < 16; ++k) {
       const PatchId patch{v.level,
-                          PlaceAmong(shape_.PatchesU(v.level), v.i - 3 + k % 4, shape_.ClosedU()),
-                          PlaceAmong(shape_.PatchesV(v.level), v.j - 3 + k / 4, false)};
+                          WrapIndex(shape_.PatchesU(v.level), v.i - 3 + k % 4, shape_.ClosedU()),
+                          WrapIndex(shape_.PatchesV(v.level), v.j - 3 + k / 4, false)};
       if (patch.i >= 0 && patch.j >= 0) {
         EnsureNode(patch);
       }
@@ -168,9 +168,9 @@ bool HierarchicalSplineSpace::IsCovered(const VertexId& v) const {
     return false;
   }
   for (int b = 2 * v.j - 3; b <= 2 * v.j + 1; ++b) {
-    const int j = PlaceAmong(shape_.Rows(level), b, false);
+    const int j = WrapIndex(shape_.Rows(level), b, false);
     for (int a = 2 * v.i - 3; j >= 0 && a <= 2 * v.i + 1; ++a) {
-      const int i = PlaceAmong(shape_.Columns(level), a, shape_.ClosedU());
+      const int i = WrapIndex(shape_.Columns(level), a, shape_.ClosedU());
       if (i >= 0 && !IsEdited({level, i, j})) {
         return false;
       }
@@ -339,7 +339,7 @@ HSplineSurface HierarchicalSplineSpace::Surface() const {
     std::map<VertexId, std::optional<Vec3>> offsets;
     for (const ControlDof* dof : level) {
       const VertexId& v = dof->vertex;
-      const SurfaceFrame frame = surface.LevelFrame(v.level - 1, surface.ParameterOf(v));
+      const SurfaceFrame frame = surface.LevelFrame(v.level - 1, surface.GrevillePoint(v));
       const Vec3 way = RefinedPosition(surface, v) + dof->value - frame.point;
       const bool world = shape_.reference == OffsetReference::kWorld;
       offsets[v] = world ? way : Vec3(frame.axes.transpose() * way);

@@ -31,7 +31,7 @@ Eigen::MatrixXd ExpectedAt(std::span<const Vec3> points, std::span<const Dowel> 
 }  // namespace
 
 std::size_t FewestDowels(DepthMean mean) {
-  const std::size_t relief = LooksAtBone(mean) ? kReliefScales_mm.size() : 0,
+  const std::size_t relief = UsesBone(mean) ? kReliefScales_mm.size() : 0,
                     geometry = mean == DepthMean::kGeometry ? kBoneGeometry : 0;
   return 1 + relief + geometry;
 }
@@ -78,7 +78,7 @@ MeanRegressors::MeanRegressors(DepthMean mean, std::string_view scheme, const De
         "none; name tissue.table and measured depths, or choose `mean: constant`",
         scheme));
   }
-  if (LooksAtBone(mean)) {
+  if (UsesBone(mean)) {
     CheckSurface(scheme, input.skull);
     const std::size_t places = DepthSamples(input.dowels).size();
     if (places < FewestDowels(mean)) {
@@ -112,7 +112,7 @@ Eigen::MatrixXd MeanRegressors::At(std::span<const Vec3> points, const RunContex
 }
 
 Eigen::MatrixXd MeanRegressors::AtVertices(const RunContext& run) const {
-  if (!LooksAtBone(mean_)) {
+  if (!UsesBone(mean_)) {
     return At(input_.skull.points, run);
   }
   Eigen::MatrixXd regressors(1 + bone_->at_vertices.rows(), std::ssize(input_.skull.points));

@@ -32,7 +32,7 @@ void MeanField(Visitor& visit, DepthMean& mean) {
 }
 
 // Returns true if the mean depends on the bone's shape and therefore needs a surface.
-inline bool LooksAtBone(DepthMean mean) {
+inline bool UsesBone(DepthMean mean) {
   return mean == DepthMean::kCovariates || mean == DepthMean::kGeometry;
 }
 

@@ -21,7 +21,7 @@ namespace {
 std::vector<double> CsvColumn(const std::string& text, const std::string& name,
                               const std::string& where) {
   CsvReader csv(text, where);
-  const std::size_t column = csv.ColumnOf(name);
+  const std::size_t column = csv.RequireColumn(name);
   std::vector<double> values;
   while (csv.NextRow()) {
     values.push_back(csv.NumberOrNan(column));

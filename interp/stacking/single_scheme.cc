@@ -13,8 +13,8 @@ bool WorksAlongSurface(const Scheme& scheme) {
       return true;
     }
   }
-  if constexpr (requires { LooksAtBone(scheme.mean); }) {
-    if (LooksAtBone(scheme.mean)) {
+  if constexpr (requires { UsesBone(scheme.mean); }) {
+    if (UsesBone(scheme.mean)) {
       return true;
     }
   }

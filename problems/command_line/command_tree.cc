@@ -77,14 +77,14 @@ std::string UnknownOption(const CommandNode& node, const std::string& called,
 
 }  // namespace
 
-CommandNode TreeOf(const CLI::App& app) {
+CommandNode MakeCommandTree(const CLI::App& app) {
   CommandNode node{
       .name = app.get_name(), .purpose = app.get_description(), .options = {}, .commands = {}};
   for (const CLI::Option* option : app.get_options()) {
     node.options.push_back(DescribeOption(*option));
   }
   for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
-    node.commands.push_back(TreeOf(*command));
+    node.commands.push_back(MakeCommandTree(*command));
   }
   return node;
 }

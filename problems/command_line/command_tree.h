@@ -29,7 +29,7 @@ struct CommandNode {
 };
 
 // Describes a command and all commands below it, in the order of their declaration.
-CommandNode TreeOf(const CLI::App& app);
+CommandNode MakeCommandTree(const CLI::App& app);
 
 // Returns a sentence about the first option that has an empty value after parsing, or "" if there
 // is none. A shell produces such a command line from an unset variable.

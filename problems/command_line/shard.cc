@@ -25,7 +25,7 @@ bool ReadShard(const std::string& text, Shard& shard) {
 
 }  // namespace
 
-Shard ShardOf(const std::string& text) {
+Shard ParseShard(const std::string& text) {
   const char *index = std::getenv("SLURM_ARRAY_TASK_ID"),
              *count = std::getenv("SLURM_ARRAY_TASK_COUNT");
   const std::string given =

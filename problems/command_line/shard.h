@@ -13,6 +13,6 @@ struct Shard {
 // Reads "I/N" with 0 <= I < N. For an empty text, takes Slurm's variables of an array of jobs
 // (SLURM_ARRAY_TASK_ID and _COUNT), or all work if they are not set. Throws InputError for any
 // other text.
-Shard ShardOf(const std::string& text);
+Shard ParseShard(const std::string& text);
 
 }  // namespace semblance

@@ -36,7 +36,7 @@ ReportTable TreatmentTable(const StudyComparison& comparison) {
 ReportTable PairTable(const StudyComparison& comparison) {
   ReportTable table{
       "Each treatment of the later studies minus its reference, over the subjects that both have" +
-          comparison.preference.OfWhat(),
+          comparison.preference.TargetSuffix(),
       {"treatment", "reference", "subjects", "mean difference", "95 % interval", "worse in",
        "p, Holm"}};
   for (const TreatmentPair& pair : comparison.pairs) {

@@ -212,7 +212,7 @@ Better CommonPreference(std::span<const NamedStudy* const> studies, const std::s
     }
     first = study;
   }
-  return first == nullptr ? BetterOf(metric) : better(first);
+  return first == nullptr ? DefaultBetter(metric) : better(first);
 }
 
 StudyComparison CompareStudies(std::span<const NamedStudy> studies, const CompareOptions& options) {

@@ -58,7 +58,7 @@ struct CompareOptions {
   std::optional<Better> better;  // none: CommonPreference
 };
 
-// The direction in which the studies that use this metric rank it. BetterOf if no study uses it.
+// The direction in which the studies that use this metric rank it. DefaultBetter if no study uses it.
 // Throws InputError if the studies contradict each other.
 Better CommonPreference(std::span<const NamedStudy* const> studies, const std::string& metric);
 

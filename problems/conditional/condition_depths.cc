@@ -54,7 +54,7 @@ std::map<std::string, double> KnownCovariates(const TissueGiven& given) {
 // Replaces the means of the table of spreads by those of the tables in use.
 void ReplaceMeans(const TissueOptions& options, JointNormal& joint) {
   std::vector<TissueTable> tables;
-  for (const std::filesystem::path& path : TablesOf(options)) {
+  for (const std::filesystem::path& path : TissueTableFiles(options)) {
     tables.push_back(ReadTissueTable(path));
   }
   for (std::size_t k = 0; k < joint.names.size(); ++k) {
@@ -228,7 +228,7 @@ std::vector<std::string> ConditionDepths(const TissueOptions& options,
   std::vector<std::string> kept;
   for (Dowel& dowel : dowels) {
     const auto own = depths.find(dowel.site);
-    if (!SetFor(options, dowel.site).empty()) {
+    if (!FindSetKey(options, dowel.site).empty()) {
       continue;  // set by hand, not by a table
     }
     if (!SetExpectedDepth(options, joint, expected, dowel)) {

@@ -391,7 +391,7 @@ void ApplyOverride(std::string_view override_text, int order, const ConfigNode& 
 ConfigNode ParseConfigText(std::string_view text, const ConfigSource& source,
                            ConfigErrors& errors) {
   const auto shared_source = std::make_shared<const ConfigSource>(source);
-  if (text.size() > kLargestConfig_bytes) {
+  if (text.size() > kMaxConfig_bytes) {
     errors.Add({shared_source, 1, 1}, "",
                fmt::format("{} MB of YAML; at most 16 MB are read", text.size() / 1'000'000));
     return EmptyMap(shared_source);

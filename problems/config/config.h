@@ -103,7 +103,7 @@ int CommonKeys(const ConfigNode& a, const ConfigNode& b);
 
 // Writes all fields into a tree, those with default values too.
 template <class T>
-ConfigNode ConfigTreeOf(const T& value) {
+ConfigNode MakeConfigTree(const T& value) {
   return config_internal::ToTree(value);
 }
 
@@ -117,7 +117,7 @@ T ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors) {
   if constexpr (requires { FaultsBetween(value); }) {
     if (errors.size() == errors_before) {
       for (const OptionFault& fault : FaultsBetween(value)) {
-        errors.Add(LocationOf(tree, fault.path), fault.path, fault.what);
+        errors.Add(FindLocation(tree, fault.path), fault.path, fault.what);
       }
     }
   }
@@ -129,7 +129,7 @@ T ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors) {
 template <class T>
 T ReadConfig(const std::filesystem::path& file, std::span<const std::string> overrides = {}) {
   ConfigErrors errors;
-  const ConfigNode tree = LoadConfigTree(file, overrides, ConfigTreeOf(T{}), errors);
+  const ConfigNode tree = LoadConfigTree(file, overrides, MakeConfigTree(T{}), errors);
   T value = ReadConfigTree<T>(tree, errors);
   errors.ThrowIfAny();
   return value;
@@ -140,7 +140,7 @@ T ReadConfig(const std::filesystem::path& file, std::span<const std::string> ove
 template <class T>
 int KnownKeys(const std::filesystem::path& file) {
   ConfigErrors errors;
-  const ConfigNode fields = ConfigTreeOf(T{});
+  const ConfigNode fields = MakeConfigTree(T{});
   return CommonKeys(LoadConfigTree(file, {}, fields, errors), fields);
 }
 
@@ -150,7 +150,7 @@ int OwnKeys(const std::filesystem::path& file) {
   ConfigErrors errors;
   const ConfigNode tree = ParseConfigText(
       ReadFileBytes(file), {.name = file.string(), .folder = file.parent_path()}, errors);
-  ConfigNode fields = ConfigTreeOf(T{});
+  ConfigNode fields = MakeConfigTree(T{});
   std::erase_if(fields.entries, [](const auto& entry) { return entry.key == "base"; });
   return CommonKeys(tree, fields);
 }
@@ -161,7 +161,7 @@ T ReadConfigText(std::string_view text, const std::filesystem::path& pretend_fil
                  std::span<const std::string> overrides = {}) {
   ConfigErrors errors;
   const ConfigNode tree =
-      LoadConfigTextTree(text, pretend_file, overrides, ConfigTreeOf(T{}), errors);
+      LoadConfigTextTree(text, pretend_file, overrides, MakeConfigTree(T{}), errors);
   T value = ReadConfigTree<T>(tree, errors);
   errors.ThrowIfAny();
   return value;
@@ -171,7 +171,7 @@ T ReadConfigText(std::string_view text, const std::filesystem::path& pretend_fil
 // for bit. Throws InputError if a number is not finite.
 template <class T>
 std::string WriteConfig(const T& value) {
-  return ToYaml(ConfigTreeOf(value));
+  return ToYaml(MakeConfigTree(value));
 }
 
 // Describes each option for people: path, type, default, range, unit and meaning.

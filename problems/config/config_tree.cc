@@ -321,7 +321,7 @@ ConfigNode MergeTrees(ConfigNode base, const ConfigNode& over) {
   return base;
 }
 
-ConfigLocation LocationOf(const ConfigNode& tree, std::string_view path) {
+ConfigLocation FindLocation(const ConfigNode& tree, std::string_view path) {
   const ConfigNode* node = &tree;
   for (const Step& step : ParsePath(path)) {
     const bool has_item = step.index && *step.index < node->items.size();

@@ -20,7 +20,7 @@ namespace semblance {
 inline constexpr std::size_t kMaxConfigDepth = 64;
 // Keys of one map. The search for a key is linear, so many keys would take quadratic time.
 inline constexpr int kMaxKeys = 10'000;
-inline constexpr std::size_t kLargestConfig_bytes = 16'000'000;
+inline constexpr std::size_t kMaxConfig_bytes = 16'000'000;
 
 // The file or override that a tree was read from.
 struct ConfigSource {
@@ -105,7 +105,7 @@ std::string JoinPath(std::string_view parent, std::size_t index);
 
 // Returns the location of the entry at `path` ("a.b[0].c"), or, if the tree lacks the entry, the
 // location of the last existing entry on the way to it.
-ConfigLocation LocationOf(const ConfigNode& tree, std::string_view path);
+ConfigLocation FindLocation(const ConfigNode& tree, std::string_view path);
 
 // Sets the entry at `path` ("a.b[0].c"; indices count from 0) to `value`, merging as MergeTrees
 // does. Missing maps on the way are created; a list must already have the item. A new `type` of a

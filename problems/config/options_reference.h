@@ -60,7 +60,7 @@ std::string ReferenceText(const ConfigType& type);
 // Writes a JSON Schema (draft 2020-12) of a file with these options.
 std::string SchemaText(const ConfigType& type);
 
-// Converts the tree of a value of that type (ConfigTreeOf) to JSON: an object for a struct, an
+// Converts the tree of a value of that type (MakeConfigTree) to JSON: an object for a struct, an
 // object with `type` for a variant, null for a number that is not finite.
 nlohmann::ordered_json ValueJson(const ConfigNode& tree, const ConfigType& type);
 

@@ -25,7 +25,7 @@ void AddResets(const std::vector<RegionReset>& resets, const HSplineSurface& sur
                Changes& changes) {
   for (const RegionReset& reset : resets) {
     for (const auto& [vertex, offset] : surface.Offsets()) {
-      const Vec2 uv = surface.ParameterOf(vertex);
+      const Vec2 uv = surface.GrevillePoint(vertex);
       if (vertex.level >= reset.first_level && Holds(reset.u, uv.x()) && Holds(reset.v, uv.y())) {
         changes[vertex] = std::nullopt;
       }

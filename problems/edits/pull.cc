@@ -41,7 +41,7 @@ std::vector<double> SharesAround(const HSplineShape& shape, int level, const Vec
   std::vector<double> shares(static_cast<std::size_t>(shape.Columns(level)) * shape.Rows(level));
   for (int j = 0; j < shape.Rows(level); ++j) {
     for (int i = 0; i < shape.Columns(level); ++i) {
-      const Vec2 at = ParameterOf(shape, {level, i, j});
+      const Vec2 at = GrevillePoint(shape, {level, i, j});
       const double du = Apart(at.x(), uv.x(), shape.ClosedU()), dv = at.y() - uv.y();
       const double squared =
           std::pow(du * shape.PatchesU(level), 2) + std::pow(dv * shape.PatchesV(level), 2);

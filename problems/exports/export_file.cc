@@ -108,7 +108,7 @@ GlbNode SkullNode(const fs::path& file) {
     for (const Json& layer : scene.at("layers")) {
       if (layer.at("id") == "skull") {
         const Json& blob = scene.at("blobs").at(layer.at("mesh").get<std::string>());
-        return {.name = "skull", .parts = {MakePart(MeshOfBlob(blob), kBone)}};
+        return {.name = "skull", .parts = {MakePart(DecodeMeshBlob(blob), kBone)}};
       }
     }
   } catch (const Json::exception& e) {
@@ -129,7 +129,7 @@ GlbNode FaceNode(const fs::path& file) {
 Vec3 ReadPoint(const CsvReader& csv, const char* name) {
   Vec3 point;
   for (const int axis : {0, 1, 2}) {
-    point[axis] = csv.NumberOrNan(csv.ColumnOf(fmt::format("{}_{}_mm", name, "xyz"[axis])));
+    point[axis] = csv.NumberOrNan(csv.RequireColumn(fmt::format("{}_{}_mm", name, "xyz"[axis])));
   }
   return point;
 }
@@ -147,7 +147,7 @@ GlbNode DowelsNode(const fs::path& file) {
     }
     TriMesh rod = MakeCylinder(base, tip, kRod_mm, kSides);
     Append(rod, MakeSphere(tip, kEnd_mm, kRings));
-    dowels.children.push_back({.name = fmt::format("dowel {}", csv.Cell(csv.ColumnOf("site"))),
+    dowels.children.push_back({.name = fmt::format("dowel {}", csv.Cell(csv.RequireColumn("site"))),
                                .parts = {MakePart(rod, kRod)}});
   }
   return dowels;

@@ -36,13 +36,13 @@ Vec3 ReadPoint(const CsvReader& csv, const std::array<std::size_t, 3>& columns) 
 
 std::array<std::size_t, 3> PointColumns(const CsvReader& csv) {
   const std::string_view unit = csv.Find("x_mm") ? "_mm" : "";
-  return {csv.ColumnOf(fmt::format("x{}", unit)), csv.ColumnOf(fmt::format("y{}", unit)),
-          csv.ColumnOf(fmt::format("z{}", unit))};
+  return {csv.RequireColumn(fmt::format("x{}", unit)), csv.RequireColumn(fmt::format("y{}", unit)),
+          csv.RequireColumn(fmt::format("z{}", unit))};
 }
 
 void CheckCode(const CsvReader& csv, const std::string& code) {
   const std::vector<std::string> facial = FacialLandmarkCodes();
-  if (!ComplaintAboutSite(code).empty() && std::ranges::find(facial, code) == facial.end()) {
+  if (!StandardSiteFault(code).empty() && std::ranges::find(facial, code) == facial.end()) {
     csv.Fail(
         fmt::format("landmark '{}' is neither one of the 32 sites (configs/networks/"
                     "standard32.yaml) nor one of {}; correct the name or drop the row",
@@ -62,7 +62,7 @@ void ReadCsv(const fs::path& file, SkinLandmarks& landmarks) {
   const std::string text = ReadFileBytes(file);
   CsvReader csv(text, file.string());
   const auto multipie = csv.Find("i_multipie");
-  const std::size_t name = multipie ? *multipie : csv.ColumnOf("site");
+  const std::size_t name = multipie ? *multipie : csv.RequireColumn("site");
   const std::array<std::size_t, 3> columns = PointColumns(csv);
   while (csv.NextRow()) {
     const std::optional<std::string> code =
@@ -98,7 +98,7 @@ void ReadSkullLandmarks(const fs::path& file, SkinLandmarks& landmarks) {
       landmarks.notes.push_back(
           fmt::format("{}: site {} has no depth or no normal, so its skin point is not known; it "
                       "was left out",
-                      file.string(), SiteInWords(landmark.site)));
+                      file.string(), DescribeSite(landmark.site)));
     }
   }
 }

@@ -81,7 +81,7 @@ std::vector<VertexId> VerticesInside(const HSplineSurface& surface, const Sphere
     for (int i = 0; i < shape.Columns(level); ++i) {
       for (int j = 0; j < shape.Rows(level); ++j) {
         const VertexId id{level, i, j};
-        if (region.Contains(surface.Point(ParameterOf(shape, id)))) {
+        if (region.Contains(surface.Point(GrevillePoint(shape, id)))) {
           inside.push_back(id);
         }
       }

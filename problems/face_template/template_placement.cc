@@ -112,7 +112,7 @@ struct LandmarkPairs {
       const Vec2 uv = UvOnGenericHead(landmark.code);
       generic.push_back(HeadPoint(uv.x(), uv.y()));
       head.push_back(landmark.point);
-      weights.push_back(ComplaintAboutSite(landmark.code).empty() ? kSiteWeight : 1);
+      weights.push_back(StandardSiteFault(landmark.code).empty() ? kSiteWeight : 1);
     }
   }
   Similarity HeadFromGeneric() const { return PlaceTemplate(generic, head, weights); }

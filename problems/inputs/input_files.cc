@@ -124,7 +124,7 @@ void CheckDepthCoverage(const Experiment& experiment, const LandmarkFile& landma
 // Checks a depth map as far as possible without the skull that it is laid on.
 void CheckMap(const DepthMap& map) {
   if (map.file.extension() == ".csv" && map.mesh.empty()) {
-    CsvReader(ReadFileBytes(map.file), map.file.string()).ColumnOf(map.scalar);
+    CsvReader(ReadFileBytes(map.file), map.file.string()).RequireColumn(map.scalar);
     return;
   }
   TriMesh point;
@@ -139,8 +139,8 @@ void CheckMap(const DepthMap& map) {
 Lines ExplainUnusedRules(const Experiment& experiment, const Case& subject, StageCache& loaded,
                    const RunContext& context) {
   std::shared_ptr<const LoadedPrior> prior;
-  if (AsksPrior(WayToFace(experiment))) {
-    prior = GivenPrior(experiment, LoadTemplate(experiment.face_template), loaded, context);
+  if (UsesPrior(WayToFace(experiment))) {
+    prior = LoadExperimentPrior(experiment, LoadTemplate(experiment.face_template), loaded, context);
   }
   return ExplainUnusedRules(experiment.rules, subject.points, subject.basis.sites.has_value(),
                       prior ? &prior->face : nullptr);
@@ -153,18 +153,18 @@ bool NamesAFile(const Experiment& experiment) {
 
 }  // namespace
 
-std::vector<NamedFile> NamedInputsOf(const Experiment& experiment) {
+std::vector<NamedFile> NamedInputs(const Experiment& experiment) {
   std::vector<NamedFile> files = NamedFiles(experiment);
-  if (TablesOf(experiment.tissue).empty()) {
+  if (TissueTableFiles(experiment.tissue).empty()) {
     std::erase_if(files,
                   [](const NamedFile& named) { return named.option.starts_with("tissue."); });
   }
   return files;
 }
 
-std::vector<std::filesystem::path> InputFilesOf(const Experiment& experiment) {
+std::vector<std::filesystem::path> InputFiles(const Experiment& experiment) {
   std::vector<std::filesystem::path> files;
-  for (const NamedFile& named : NamedInputsOf(experiment)) {
+  for (const NamedFile& named : NamedInputs(experiment)) {
     files.push_back(named.file);
   }
   return files;
@@ -172,7 +172,7 @@ std::vector<std::filesystem::path> InputFilesOf(const Experiment& experiment) {
 
 GivenFiles GivenTo(const Experiment& experiment, const std::filesystem::path& config,
                    std::span<const std::string_view> outputs) {
-  GivenFiles given{.files = InputFilesOf(experiment), .outputs = outputs};
+  GivenFiles given{.files = InputFiles(experiment), .outputs = outputs};
   given.files.push_back(config);
   // The modes of a prior may be a folder, of which each mesh is read.
   std::ranges::copy(PriorFiles(experiment.prior), std::back_inserter(given.files));
@@ -221,7 +221,7 @@ CheckFindings InputCheck::CheckSubjectFiles(const Experiment& experiment) {
 
 CheckFindings InputCheck::CheckTissue(const Experiment& experiment) {
   CheckFindings findings;
-  for (const fs::path& table : TablesOf(experiment.tissue)) {
+  for (const fs::path& table : TissueTableFiles(experiment.tissue)) {
     findings.Add(Once("table " + table.string(), [&](CheckFindings& found) {
       found.warnings = TableWarnings(ReadTissueTable(table));
     }));
@@ -246,7 +246,7 @@ CheckFindings InputCheck::CheckFace(const Experiment& experiment) {
     findings.Add(Once(key, [&](CheckFindings& found) {
       Try(found, [&] { LoadBust(experiment.bust, experiment.face_template, context_); });
       const TemplateFace generic = LoadTemplate(experiment.face_template);
-      GivenPrior(experiment, generic, loaded_, context_);
+      LoadExperimentPrior(experiment, generic, loaded_, context_);
       if (const auto* const reference = std::get_if<ReferenceFace>(&experiment.face)) {
         ReadLandmarks(reference->landmarks);
       }

@@ -21,10 +21,10 @@ namespace semblance {
 
 // The files that an experiment reads, each with the option that names it, in the order of the
 // options. A table that no depth is taken from (`depths: measured`) is left out.
-std::vector<NamedFile> NamedInputsOf(const Experiment& experiment);
+std::vector<NamedFile> NamedInputs(const Experiment& experiment);
 
 // The same files without the options.
-std::vector<std::filesystem::path> InputFilesOf(const Experiment& experiment);
+std::vector<std::filesystem::path> InputFiles(const Experiment& experiment);
 
 // Input files that a job of the experiment must not overwrite: its configuration and the files
 // above. `outputs` names the files that the job may write; it is kept by reference.

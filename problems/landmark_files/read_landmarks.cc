@@ -111,7 +111,7 @@ void FindRepeats(const LandmarkFile& file, std::vector<std::string>& faults) {
   std::set<std::string> sites;
   const auto see = [&](const std::string& site) {
     if (!sites.insert(site).second) {
-      faults.push_back(fmt::format("site {} appears twice; keep one", SiteInWords(site)));
+      faults.push_back(fmt::format("site {} appears twice; keep one", DescribeSite(site)));
     }
   };
   std::ranges::for_each(file.landmarks, see, &Landmark::site);
@@ -226,11 +226,11 @@ std::string EncodeLandmarks(const LandmarkFile& file, const fs::path& path) {
   return format.encode(format.parse == nullptr ? file : InLpsMm(file));
 }
 
-std::string AxesIn(const LandmarkFile& file, const fs::path& path) {
+std::string WrittenAxes(const LandmarkFile& file, const fs::path& path) {
   return FindFormat(path).parse == nullptr ? file.axes : "LPS";
 }
 
-std::vector<std::string> LostIn(const LandmarkFile& file, const fs::path& path) {
+std::vector<std::string> LostContents(const LandmarkFile& file, const fs::path& path) {
   const Format& format = FindFormat(path);
   const auto count = [&](auto&& has) { return std::ranges::count_if(file.landmarks, has); };
   const auto measured = count([](const Landmark& l) {
@@ -252,7 +252,7 @@ std::vector<std::string> LostIn(const LandmarkFile& file, const fs::path& path) 
   if (format.parse != nullptr && file.proposed) {
     lost.emplace_back("the mark that they are a proposal");
   }
-  if (AxesIn(file, path) != file.axes) {
+  if (WrittenAxes(file, path) != file.axes) {
     lost.push_back(fmt::format(
         "the axes {}; points and normals are turned to LPS (x and y negated)", file.axes));
   }

@@ -37,9 +37,9 @@ LandmarkReading ReadLandmarks(const std::filesystem::path& path,
 std::string EncodeLandmarks(const LandmarkFile& file, const std::filesystem::path& path);
 
 // The axes in which EncodeLandmarks writes: "LPS" or "RAS".
-std::string AxesIn(const LandmarkFile& file, const std::filesystem::path& path);
+std::string WrittenAxes(const LandmarkFile& file, const std::filesystem::path& path);
 
 // Lists, a line each, the contents of `file` that are lost in the format; empty if nothing is lost.
-std::vector<std::string> LostIn(const LandmarkFile& file, const std::filesystem::path& path);
+std::vector<std::string> LostContents(const LandmarkFile& file, const std::filesystem::path& path);
 
 }  // namespace semblance

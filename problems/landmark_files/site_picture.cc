@@ -208,7 +208,7 @@ const Site& KnownSite(std::string_view code) {
   if (const Site* const site = FindSite(code); site != nullptr) {
     return *site;
   }
-  throw InputError(ComplaintAboutLandmark(code));
+  throw InputError(SiteFault(code));
 }
 
 }  // namespace
@@ -249,7 +249,7 @@ SiteSketch MakeSiteSketch(int threads) {
   return sketch;
 }
 
-Image PictureOf(const SiteSketch& sketch, std::string_view code) {
+Image DrawSitePicture(const SiteSketch& sketch, std::string_view code) {
   const Site& site = KnownSite(code);
   Image both = MakeImage(2 * kSketchWidth, kSketchHeight, HexColour(0xffffff));
   Paste(both, Marked(sketch, sketch.seen[0], site, /*from_its_side=*/false), 0, 0);

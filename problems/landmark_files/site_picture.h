@@ -32,6 +32,6 @@ SiteSketch MakeSiteSketch(int threads);
 // The site seen from the front and from its side (a site in the midline: from the left), 440 x 260
 // pixels. The site is a large disc, or a ring if bone hides it; the standard sites of that side are
 // small discs. Throws InputError for a site that is in neither list.
-Image PictureOf(const SiteSketch& sketch, std::string_view site);
+Image DrawSitePicture(const SiteSketch& sketch, std::string_view site);
 
 }  // namespace semblance

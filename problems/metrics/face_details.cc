@@ -81,7 +81,7 @@ std::vector<FeatureDistortion> MeasureFeatures(const TemplateFace& placed,
   for (const TemplateFeature& feature : placed.features) {
     if (feature.region) {
       const auto inside = [&](const Vec3& p) { return feature.region->Contains(p); };
-      parts.push_back({feature.name, DistortionWhere(fitted, placed.surface, inside)});
+      parts.push_back({feature.name, MeasureDistortion(fitted, placed.surface, inside)});
     }
   }
   const auto inside = [&](const Vec3& p) {
@@ -89,8 +89,8 @@ std::vector<FeatureDistortion> MeasureFeatures(const TemplateFace& placed,
                        [&](const auto& f) { return f.region && f.region->Contains(p); });
   };
   const auto outside = [&](const Vec3& p) { return !inside(p); };
-  parts.push_back({"features", DistortionWhere(fitted, placed.surface, inside)});
-  parts.push_back({"elsewhere", DistortionWhere(fitted, placed.surface, outside)});
+  parts.push_back({"features", MeasureDistortion(fitted, placed.surface, inside)});
+  parts.push_back({"elsewhere", MeasureDistortion(fitted, placed.surface, outside)});
   return parts;
 }
 
@@ -177,7 +177,7 @@ Json SkinJson(const ScoredSkin& skin) {
 
 }  // namespace
 
-ScoreBasis BasisOf(std::vector<Dowel> landmarks) {
+ScoreBasis MakeScoreBasis(std::vector<Dowel> landmarks) {
   constexpr std::size_t kFewestSites = 3;  // a pose needs as many
   ScoreBasis basis{std::nullopt, std::move(landmarks)};
   std::vector<SitePoint> points;

@@ -83,7 +83,7 @@ struct ScoreBasis {
   std::vector<Dowel> landmarks;     // as they were given: site, base, and direction if known
 };
 // The result has no sites if fewer than three landmarks are at standard sites (sites.h).
-ScoreBasis BasisOf(std::vector<Dowel> landmarks);
+ScoreBasis MakeScoreBasis(std::vector<Dowel> landmarks);
 
 struct FaceDetails {
   BestFitScore best_fit;

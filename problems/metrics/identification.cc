@@ -53,7 +53,7 @@ double Rms_mm(const CommonPoints& common, const Similarity& known_from_probe) {
 
 }  // namespace
 
-double RankOf(std::span<const double> distances_mm, std::size_t own) {
+double FindRank(std::span<const double> distances_mm, std::size_t own) {
   const double mine = OrLargest(distances_mm[own]);
   double closer = 0, equal = 0;
   for (std::size_t k = 0; k < distances_mm.size(); ++k) {
@@ -73,7 +73,7 @@ std::vector<double> CumulativeMatch(std::span<const double> ranks, int gallery) 
   return shares;
 }
 
-FaceDistance DistanceOf(const ProbeFace& probe, const KnownFace& known, const RunContext& context) {
+FaceDistance MeasureFaceDistance(const ProbeFace& probe, const KnownFace& known, const RunContext& context) {
   const CommonPoints common = Common(probe, known);
   const Similarity known_from_probe =
       PlaceTemplate(common.of_probe, common.of_known, {}, {.rotate = true, .scale = false});
@@ -82,7 +82,7 @@ FaceDistance DistanceOf(const ProbeFace& probe, const KnownFace& known, const Ru
   return {.surface_mm = fit.truth_to_face.rms_mm, .landmarks_mm = Rms_mm(common, known_from_probe)};
 }
 
-ProbeFace SeenAgain(const KnownFace& known, double cell_mm, double noise_mm,
+ProbeFace SimulateRescan(const KnownFace& known, double cell_mm, double noise_mm,
                     std::uint64_t random_seed) {
   Random random(random_seed);
   ProbeFace again{.mesh = ClusterVertices(known.skin, cell_mm), .points = known.points};

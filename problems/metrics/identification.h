@@ -17,7 +17,7 @@ namespace semblance {
 // The place of `own` in the gallery sorted by distance: 1 + the number of closer persons + half of
 // the number of equally close ones, so that a gallery of equals gives the mean rank. A distance
 // that is not finite counts as the largest. distances_mm: one per person; own: an index of it.
-double RankOf(std::span<const double> distances_mm, std::size_t own);
+double FindRank(std::span<const double> distances_mm, std::size_t own);
 
 // The cumulative match characteristic (Phillips et al. 2000): entry [k - 1] is the share of ranks
 // that do not exceed k, for k = 1 ... gallery. Ranks lie in 1 ... gallery, so the last entry is 1.
@@ -52,12 +52,12 @@ struct FaceDistance {
 // The motion keeps the size, because size distinguishes people. The surface is placed by the
 // points, then by ScoreBestFit (protocols.h). Throws InputError if the two faces have fewer than
 // three common points or if no skin is scored.
-FaceDistance DistanceOf(const ProbeFace& probe, const KnownFace& known, const RunContext& context);
+FaceDistance MeasureFaceDistance(const ProbeFace& probe, const KnownFace& known, const RunContext& context);
 
 // Simulates another scan of the true face. Vertices are clustered in cells of cell_mm (> 0). Then
 // each vertex moves at random along its normal, by noise_mm (>= 0) rms. The points move at random
 // in all directions, by noise_mm rms.
-ProbeFace SeenAgain(const KnownFace& known, double cell_mm, double noise_mm,
+ProbeFace SimulateRescan(const KnownFace& known, double cell_mm, double noise_mm,
                     std::uint64_t random_seed);
 
 }  // namespace semblance

@@ -236,7 +236,7 @@ void GiveDepths(const SubjectData& data, const Experiment& experiment, const Mes
   const TissueOptions tissue = WithSiteDepths(experiment, data.landmarks);
   const std::vector<std::string> on_depths =
       FillDepths(tissue, data.landmarks, subject.dowels_on_bone);
-  subject.basis = BasisOf(DowelsAsGiven(subject));
+  subject.basis = MakeScoreBasis(DowelsAsGiven(subject));
   subject.scored_on_bone = subject.dowels_on_bone;
   Append(subject.notes, UsesAllAsGiven(experiment.landmarks)
                             ? on_depths
@@ -288,7 +288,7 @@ void AddUnusedUv(const Experiment& experiment, const Case& subject,
 
 void AppendInputs(const Experiment& experiment, Case& subject) {
   subject.inputs.push_back(experiment.network);
-  Append(subject.inputs, TablesOf(ExpectedTissue(experiment).value_or(experiment.tissue)));
+  Append(subject.inputs, TissueTableFiles(ExpectedTissue(experiment).value_or(experiment.tissue)));
   if (IsConditioned(experiment.tissue) && !experiment.tissue.given.spread.empty()) {
     subject.inputs.push_back(experiment.tissue.given.spread);
   }

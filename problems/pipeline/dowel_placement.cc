@@ -111,12 +111,12 @@ ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels_on_bone, const Tr
       result.notes.push_back(fmt::format(
           "site {}: the dowel of {:.1f} mm ends {:.1f} mm under the shell; there the "
           "shell gets {:.1f} mm",
-          SiteInWords(dowel.site), dowel.depth_mm, beyond - dowel.depth_mm, least_depth_mm));
+          DescribeSite(dowel.site), dowel.depth_mm, beyond - dowel.depth_mm, least_depth_mm));
     } else if (gap >= kLeastNoted_mm) {
       result.notes.push_back(
           fmt::format("site {}: the shell lies {:.1f} mm over the bone; of {:.1f} mm of tissue "
                       "{:.1f} mm are outside it",
-                      SiteInWords(dowel.site), gap, dowel.depth_mm,
+                      DescribeSite(dowel.site), gap, dowel.depth_mm,
                       std::max(dowel.depth_mm - gap, least_depth_mm)));
     }
     dowel.base += gap * dowel.direction;

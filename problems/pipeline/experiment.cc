@@ -124,7 +124,7 @@ void CheckPhantom(const Subject& subject, std::vector<OptionFault>& faults) {
 
 void CheckRegion(const FaceRegionOptions& region, std::vector<OptionFault>& faults) {
   for (std::size_t k = 0; k < region.exclude.size(); ++k) {
-    if (std::string complaint = ComplaintAboutSite(region.exclude[k].site); !complaint.empty()) {
+    if (std::string complaint = StandardSiteFault(region.exclude[k].site); !complaint.empty()) {
       faults.push_back({fmt::format("region.exclude[{}].site", k), std::move(complaint)});
     }
   }
@@ -183,7 +183,7 @@ void CheckReference(const Experiment& experiment, std::vector<OptionFault>& faul
 // Checks terms and priors that only some ways to a face use.
 void CheckWayToFace(const Experiment& experiment, std::vector<OptionFault>& faults) {
   const FaceSource face = WayToFace(experiment);
-  const bool asks = AsksPrior(face);
+  const bool asks = UsesPrior(face);
   if (asks && std::holds_alternative<IctPrior>(experiment.prior) &&
       !std::holds_alternative<IctTemplate>(experiment.face_template)) {
     faults.push_back({"face",
@@ -222,7 +222,7 @@ void CheckUncertainty(const Experiment& experiment, std::vector<OptionFault>& fa
     return;
   }
   const UncertaintyOptions usual, &given = experiment.uncertainty;
-  const bool asks = AsksPrior(face);
+  const bool asks = UsesPrior(face);
   const auto refuse = [&](const char* field, const std::string& remedy) {
     faults.push_back(
         {fmt::format("uncertainty.{}", field),
@@ -277,14 +277,14 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   check.Steps("first_fit", experiment.first_fit);
   check.At("seeds.direction_level", experiment.seeds.direction_level);
   std::vector<OptionFault> faults = check.Take();
-  for (const FitFault& fault : FaultsOf(experiment.fit, levels.finest)) {
+  for (const FitFault& fault : FindFitFaults(experiment.fit, levels.finest)) {
     faults.push_back(
         {"fit." + fault.path, fault.too_fine ? fault.what + ", or " + levels.remedy : fault.what});
   }
   for (const OptionFault& fault : CheckRules(experiment.rules)) {
     faults.push_back({"rules." + fault.path, fault.what});
   }
-  for (const OptionFault& fault : FaultsOfSites(experiment.sites)) {
+  for (const OptionFault& fault : SiteOptionFaults(experiment.sites)) {
     faults.push_back({"sites." + fault.path, fault.what});
   }
   CheckExpected(experiment, faults);
@@ -304,7 +304,7 @@ std::vector<std::string> UnusedOptions(const Experiment& experiment) {
   if (std::holds_alternative<FittedTemplate>(face)) {
     return UnusedFitOptions(experiment);
   }
-  const ConfigNode given = ConfigTreeOf(experiment), usual = ConfigTreeOf(Experiment());
+  const ConfigNode given = MakeConfigTree(experiment), usual = MakeConfigTree(Experiment());
   std::vector<std::string> paths;
   for (const std::string_view option : {"first_fit", "seeds", "rounds", "fit"}) {
     AddDifferences(std::string(option), *given.Find(option), *usual.Find(option), paths);
@@ -320,14 +320,14 @@ std::vector<std::string> UnusedOptions(const Experiment& experiment) {
   }
   for (const std::string& path : paths) {
     notes.push_back(fmt::format("{}: `face: {}` does not use it{}", path, NameOf(face),
-                                path == "seeds.weight" && AsksPrior(face)
+                                path == "seeds.weight" && UsesPrior(face)
                                     ? "; face.seed_weight of prior_then_fit replaces it"
                                     : ""));
   }
   return notes;
 }
 
-template ConfigNode ConfigTreeOf(const Experiment& value);
+template ConfigNode MakeConfigTree(const Experiment& value);
 template Experiment ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors);
 template Experiment ReadConfig(const std::filesystem::path& file,
                                std::span<const std::string> overrides);

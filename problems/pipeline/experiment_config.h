@@ -14,7 +14,7 @@
 
 namespace semblance {
 
-extern template ConfigNode ConfigTreeOf(const Experiment& value);
+extern template ConfigNode MakeConfigTree(const Experiment& value);
 extern template Experiment ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors);
 extern template Experiment ReadConfig(const std::filesystem::path& file,
                                       std::span<const std::string> overrides);
@@ -34,7 +34,7 @@ ConfigType DescribeExperiment();
 template <class... Options>
 std::string StageKey(const char* stage, const Options&... options) {
   std::string key = stage;
-  for (const std::string& text : {ToFlowYaml(ConfigTreeOf(options))...}) {
+  for (const std::string& text : {ToFlowYaml(MakeConfigTree(options))...}) {
     key += "\n" + text;
   }
   return key;

@@ -98,14 +98,14 @@ void CheckApart(const Dowel& dowel, std::span<const Dowel> others) {
           fmt::format("sites.{}: it is at the same place as {}, so one point of the bone has two "
                       "depths; place it "
                       "elsewhere, or set the depth of {} alone",
-                      dowel.site, SiteInWords(other.site), other.site));
+                      dowel.site, DescribeSite(other.site), other.site));
     }
   }
 }
 
 // The name of the first table that has a depth for the site; empty where none has.
 std::string TableWith(const TissueOptions& tissue, const std::string& site) {
-  for (const std::filesystem::path& path : TablesOf(tissue)) {
+  for (const std::filesystem::path& path : TissueTableFiles(tissue)) {
     const TissueTable table = ReadTissueTable(path);
     if (FindDepth(table, tissue.sex, tissue.build, site)) {
       return table.id;
@@ -132,7 +132,7 @@ bool IsLandmark(const std::string& name, const ExtraSite& site, const LandmarkFi
     throw InputError(fmt::format(
         "sites.{}: {} appears twice, as it is among the landmarks; leave `near` out, or "
         "give the site a name of its own",
-        name, SiteInWords(name)));
+        name, DescribeSite(name)));
   }
   return true;
 }
@@ -147,7 +147,7 @@ std::string SetOwnDepth(const AutoOr<double>& depth, Dowel& dowel) {
 // Describes the source of a depth that `sites` does not state. Throws InputError if there is none.
 std::string DescribeSource(const TissueOptions& tissue, const LandmarkFile& landmarks,
                            const std::string& site) {
-  if (!SetFor(tissue, site).empty()) {
+  if (!FindSetKey(tissue, site).empty()) {
     return "of tissue.set_mm";
   }
   if (KnownDepths(tissue.given, landmarks).contains(site)) {
@@ -164,7 +164,7 @@ std::string DescribeSource(const TissueOptions& tissue, const LandmarkFile& land
 std::set<std::string> SetsFor(const TissueOptions& tissue, std::span<const std::string> sites) {
   std::set<std::string> keys;
   for (const std::string& site : sites) {
-    keys.insert(SetFor(tissue, site));
+    keys.insert(FindSetKey(tissue, site));
   }
   return keys;
 }
@@ -213,7 +213,7 @@ std::vector<std::string> GiveInserted(const Experiment& experiment, const Landma
     const auto filled = std::ranges::find(of_tissue, dowel.site, &Dowel::site);
     dowel = filled == of_tissue.end() ? dowel : *filled;
     notes.push_back(
-        fmt::format("site {}: dowel inserted, {}", SiteInWords(dowel.site),
+        fmt::format("site {}: dowel inserted, {}", DescribeSite(dowel.site),
                     own ? SetOwnDepth(*own, dowel)
                         : fmt::format("{:.4g} mm, {}", dowel.depth_mm,
                                       DescribeSource(experiment.tissue, landmarks, dowel.site))));
@@ -280,7 +280,7 @@ void InsertDowels(const Experiment& experiment, const SubjectData& data, const M
     if (!site.uv && site.near.IsNull()) {
       throw InputError(fmt::format(
           "sites.{}: {} is not among the landmarks; place it there, or give `near` or `uv`", name,
-          SiteInWords(name)));
+          DescribeSite(name)));
     }
     Dowel dowel = OnBone(name, placing.At(name, site), data, skull, experiment.landmarks);
     CheckApart(dowel, subject.dowels_on_bone);
@@ -308,13 +308,13 @@ std::vector<std::string> JoinNetwork(const NetworkPlan& plan, std::span<const Do
         break;
       case Insertion::kOutside:
         notes.push_back(fmt::format(
-            "site {}: outside the dowel network, which got an area more there", SiteInWords(site)));
+            "site {}: outside the dowel network, which got an area more there", DescribeSite(site)));
         break;
       case Insertion::kNone:
         notes.push_back(
             fmt::format("site {}: outside the dowel network, and no area joins it: schemes that "
                         "work on the network do not use its depth",
-                        SiteInWords(site)));
+                        DescribeSite(site)));
         break;
     }
   }
@@ -334,7 +334,7 @@ void FillOpenDowels(const TriMesh& shell, const DepthField& depth, Case& subject
       subject.dowels_on_bone.push_back(dowel);
     } else {
       subject.notes.push_back(fmt::format("site {}: no depth is interpolated there; dowel left out",
-                                          SiteInWords(dowel.site)));
+                                          DescribeSite(dowel.site)));
     }
   }
   subject.open_dowels.clear();

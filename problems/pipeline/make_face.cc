@@ -104,7 +104,7 @@ HSplineSurface FirstFit(const FitPlan& plan, const TemplateFace& placed, const F
     return placed.surface;
   }
   FitOptions first = plan.fit;
-  first.plan = ListedPlan{.schedule = plan.first_fit, .aim = AimOf(plan.fit.plan)};
+  first.plan = ListedPlan{.schedule = plan.first_fit, .aim = PlanAim(plan.fit.plan)};
   first.relaxation = NoRelaxation{};
   return Fit(placed.surface, placed.surface, dowels, FeatureVertices(placed), first, context)
       .surface;
@@ -286,9 +286,9 @@ void Reproject(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& 
 ShapeEstimate Estimate(const FacePrior& prior, const PriorUse& use, ShapeTarget& target,
                        const RunContext& context) {
   if (HasOtherSites(prior, target)) {
-    const bool tells_spread = std::exchange(target.tells_spread, false);
+    const bool compute_spread = std::exchange(target.compute_spread, false);
     Reproject(EstimateShape(prior.model, target, use.estimate, context), prior, target);
-    target.tells_spread = tells_spread;
+    target.compute_spread = compute_spread;
   }
   return EstimateShape(prior.model, target, use.estimate, context);
 }
@@ -381,7 +381,7 @@ MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceIn
   RuleMarks rules = ApplySubjectRules(in, prior.face);
   target.marks = std::move(rules.marks);
   target.draws = ListDraws(use, in.experiment.uncertainty);
-  target.tells_spread = in.tells_sigma || !target.draws.empty();
+  target.compute_spread = in.tells_sigma || !target.draws.empty();
   ShapeEstimate shape = Estimate(prior.face, use, target, context);
   for (std::size_t k = 0; k < rules.rules.size(); ++k) {
     rules.rules[k].residual_mm = shape.mark_residual_mm[k];
@@ -508,10 +508,10 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
 
 }  // namespace
 
-std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
+std::shared_ptr<const LoadedPrior> LoadExperimentPrior(const Experiment& experiment,
                                               const TemplateFace& generic, StageCache& cache,
                                               const RunContext& context) {
-  if (!AsksPrior(WayToFace(experiment))) {
+  if (!UsesPrior(WayToFace(experiment))) {
     return nullptr;
   }
   return cache.Get<LoadedPrior>(StageKey("prior", experiment.prior, experiment.face_template), [&] {

@@ -59,7 +59,7 @@ struct MadeFace {
 
 // The prior of the experiment, laid on its template; null if its face does not use one. Throws as
 // LoadPrior and LayOnTemplate do.
-std::shared_ptr<const LoadedPrior> GivenPrior(const Experiment& experiment,
+std::shared_ptr<const LoadedPrior> LoadExperimentPrior(const Experiment& experiment,
                                               const TemplateFace& generic, StageCache& cache,
                                               const RunContext& context);
 

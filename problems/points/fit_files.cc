@@ -131,7 +131,7 @@ void CheckChord(const AutoOr<double>& chord_mm, const HSplineSurface& start,
   double least_mm = std::max(chord_mm.value, kFinest * extent_mm);
   if (points.size() >= kFewest) {
     const HSplineSurface rough = RoughSurface(start, points, context);
-    least_mm = AffordableChord(rough, least_mm, kMostCells / 4);
+    least_mm = AffordableChord(rough, least_mm, kMaxCells / 4);
   }
   RefuseBelow(least_mm, chord_mm.value);
 }
@@ -141,7 +141,7 @@ double ChooseChord(const HSplineSurface& surface, const AutoOr<double>& chord_mm
   return chord_mm.automatic
              ? AffordableChord(surface, BoxDiagonal(surface.Net(0).vertices) / kChordsPerExtent,
                                kEnough)
-             : AffordableChord(surface, chord_mm, kMostCells / 4);
+             : AffordableChord(surface, chord_mm, kMaxCells / 4);
 }
 
 std::string SurfacePly(const PointFit& result, double chord_mm, int threads) {

@@ -28,7 +28,7 @@ namespace {
 HSplineShape ShapeFor(const PointFitOptions& options) {
   return {.patches_u = options.patches_u,
           .patches_v = options.patches_v,
-          .max_level = FinestLevelOf(options.fit.plan),
+          .max_level = FinestPlanLevel(options.fit.plan),
           .closure = options.closure};
 }
 
@@ -150,7 +150,7 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options) {
     add("fit.features", "a surface through points of a file has no features; leave the option out");
   }
   AddTermFaults(options.fit.terms, faults);
-  for (const FitFault& fault : FaultsOf(WithoutRelaxation(options.fit), shape.max_level)) {
+  for (const FitFault& fault : FindFitFaults(WithoutRelaxation(options.fit), shape.max_level)) {
     add("fit." + fault.path, fault.what);
   }
   return faults;

@@ -51,11 +51,11 @@ void Fields(Visitor& visit, PointFitOptions& o) {
   visit(FieldInfo{.name = "title", .doc = "heading of the result"}, o.title);
   visit(FieldInfo{.name = "patches_u",
                   .min = 1,
-                  .max = kMostPatches,
+                  .max = kMaxPatches,
                   .doc = "of level 0 along u; each finer level has twice as many; with patches_v "
                          "at most a million control vertices"},
         o.patches_u);
-  visit(FieldInfo{.name = "patches_v", .min = 1, .max = kMostPatches, .doc = "of level 0 along v"},
+  visit(FieldInfo{.name = "patches_v", .min = 1, .max = kMaxPatches, .doc = "of level 0 along v"},
         o.patches_v);
   visit(FieldInfo{.name = "closure",
                   .doc = "open; or periodic_u for surfaces that go round in u, as a tube does"},

@@ -167,7 +167,7 @@ class Predictor {
   bool has_person_ = false, has_known_ = false;
 };
 
-void Score(int subjects, Foresight& way) {
+void Score(int subjects, PredictedSites& way) {
   std::vector<double> errors, sds, sums(subjects, 0), counts(subjects, 0);
   for (const PredictedDepth& depth : way.depths) {
     errors.push_back(depth.predicted_mm - depth.depth_mm);
@@ -181,8 +181,8 @@ void Score(int subjects, Foresight& way) {
   }
 }
 
-void CompareWithMean(std::vector<Foresight>& ways) {
-  for (Foresight& way : ways) {
+void CompareWithMean(std::vector<PredictedSites>& ways) {
+  for (PredictedSites& way : ways) {
     std::vector<double> differences;
     for (std::size_t subject = 0; subject < way.mae_mm.size(); ++subject) {
       const double difference = way.mae_mm[subject] - ways.front().mae_mm[subject];
@@ -196,11 +196,11 @@ void CompareWithMean(std::vector<Foresight>& ways) {
 
 }  // namespace
 
-std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
+std::vector<PredictedSites> LeaveOneOut(const PopulationFile& file,
                                    const std::vector<CountedSubject>& subjects,
                                    const JointSample& sample) {
   constexpr Index kMinSubjects = 3;
-  std::vector<Foresight> result;
+  std::vector<PredictedSites> result;
   if (sample.values.rows() < kMinSubjects) {
     return result;
   }
@@ -222,7 +222,7 @@ std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
       result[w].name = ways[w].first;
     }
   }
-  for (Foresight& way : result) {
+  for (PredictedSites& way : result) {
     way.assumed = predictor.CountAssumed(way.name);
     Score(static_cast<int>(sample.values.rows()), way);
   }

@@ -20,7 +20,7 @@ struct PredictedDepth {
 };
 
 // The predictions of one method for the sites of all subjects.
-struct Foresight {
+struct PredictedSites {
   // The method. "mean": mean of the others; "person": given sex, build, age and body mass index as
   // far as they are known; "known": given the depths at PopulationFile::known; "person_known":
   // given both; otherwise the id of a published table, with a number if the name is taken.
@@ -39,7 +39,7 @@ struct Foresight {
 // is predicted from those that it has. The methods `person` and `person_known` are left out if no
 // two subjects are known to differ in a covariate, `known` and `person_known` if no known site
 // varies. The result is empty with fewer than three subjects.
-std::vector<Foresight> LeaveOneOut(const PopulationFile& file,
+std::vector<PredictedSites> LeaveOneOut(const PopulationFile& file,
                                    const std::vector<CountedSubject>& subjects,
                                    const JointSample& sample);
 

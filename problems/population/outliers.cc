@@ -27,7 +27,7 @@ std::vector<double> RobustZ(const std::vector<double>& values, double min_deviat
     }
   }
   std::vector<double> z(values.size(), kNaN);
-  if (std::ssize(there) < kFewestForOutliers) {
+  if (std::ssize(there) < kMinSubjectsForOutliers) {
     return z;
   }
   const double median = Quantile(there, 0.5);

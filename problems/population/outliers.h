@@ -12,7 +12,7 @@ namespace semblance {
 
 // The number of subjects with a depth at a site from which outliers are searched there. The median
 // absolute deviation of fewer subjects is not reliable.
-inline constexpr int kFewestForOutliers = 8;
+inline constexpr int kMinSubjectsForOutliers = 8;
 
 struct Outlier {
   int subject = -1;           // row of the sample
@@ -28,7 +28,7 @@ struct Outlier {
 //   covariates, in the joint distribution. s is at least 0.2 mm.
 //   A subject: e is the logarithm of the root mean square, over its sites, of (depth - median) / s.
 //   Here s is at least 0.1.
-// Sites that fewer than kFewestForOutliers subjects have are skipped. Depths come first in the
+// Sites that fewer than kMinSubjectsForOutliers subjects have are skipped. Depths come first in the
 // result, in the order of the subjects.
 std::vector<Outlier> FindOutliers(const JointSample& sample, const JointNormal& joint,
                                   const OutlierOptions& options);

@@ -39,7 +39,7 @@ std::vector<fs::path> ListFiles(const fs::path& path) {
 // The options as text, in which the hash of a file's content replaces its path.
 template <class Options>
 std::string Fingerprint(const Options& options, FileHashes& hashes) {
-  std::string text = ToFlowYaml(ConfigTreeOf(options));
+  std::string text = ToFlowYaml(MakeConfigTree(options));
   for (const NamedFile& named : NamedFiles(options)) {
     std::string content;
     for (const fs::path& part : ListFiles(named.file)) {
@@ -257,13 +257,13 @@ void CheckColumns(const CsvReader& csv) {
       csv.Fail(fmt::format("unknown column '{}'{}", column, Suggestion(LowerCase(column), known)));
     }
   }
-  csv.ColumnOf("name");
+  csv.RequireColumn("name");
 }
 
 // The subject of a row; each subject may have one row.
 PopulationSubject& FindPerson(const CsvReader& csv, std::set<std::string>& had,
                               std::vector<PopulationSubject>& subjects) {
-  const std::string name(csv.Cell(csv.ColumnOf("name")));
+  const std::string name(csv.Cell(csv.RequireColumn("name")));
   const auto subject = std::ranges::find(subjects, name, &PopulationSubject::name);
   if (subject == subjects.end()) {
     std::vector<std::string> names;
@@ -324,7 +324,7 @@ std::string SiteCodesFault(const std::vector<std::string>& codes) {
     const bool is_known = std::ranges::any_of(
         AllSites(), [&](const Site& site) { return site.code == code || site.landmark == code; });
     if (!is_known) {
-      return ComplaintAboutLandmark(code);
+      return SiteFault(code);
     }
   }
   return "";
@@ -365,7 +365,7 @@ PopulationPlan ReadPopulation(const fs::path& path) {
   return plan;
 }
 
-std::vector<NamedFile> NamedInputsOf(const PopulationFile& file) {
+std::vector<NamedFile> NamedInputs(const PopulationFile& file) {
   PopulationFile needed = file;
   for (PopulationSubject& subject : needed.subjects) {
     if (subject.optional) {

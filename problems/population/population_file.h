@@ -299,6 +299,6 @@ struct PopulationPlan {
 PopulationPlan ReadPopulation(const std::filesystem::path& path);
 
 // The files that must exist: those of subjects that are not optional, tables and references.
-std::vector<NamedFile> NamedInputsOf(const PopulationFile& file);
+std::vector<NamedFile> NamedInputs(const PopulationFile& file);
 
 }  // namespace semblance

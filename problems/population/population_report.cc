@@ -30,10 +30,10 @@ std::string WayText(const std::string& name) {
   return at == kWords.end() ? "table " + name : (*at)[1];
 }
 
-const Foresight* BestWay(const PopulationResult& result) {
+const PredictedSites* BestWay(const PopulationResult& result) {
   const auto best = std::ranges::min_element(
-      result.foresights, {}, [](const Foresight& way) { return way.scores.mae_mm; });
-  return best == result.foresights.end() ? nullptr : &*best;
+      result.predictions, {}, [](const PredictedSites& way) { return way.scores.mae_mm; });
+  return best == result.predictions.end() ? nullptr : &*best;
 }
 
 std::vector<ReportTile> Tiles(const PopulationResult& result) {
@@ -47,9 +47,9 @@ std::vector<ReportTile> Tiles(const PopulationResult& result) {
                                         : "listed, not left out"},
       {"correlations", fmt::format("{:.0f}", 100 * (1 - result.joint.shrinkage)), "%",
        "from the subjects; the rest is from a model"}};
-  if (!result.foresights.empty() && result.foresights[0].scores.points > 0) {
+  if (!result.predictions.empty() && result.predictions[0].scores.points > 0) {
     tiles.push_back({"a subject left out",
-                     fmt::format("{:.2f}", result.foresights[0].scores.mae_mm), "mm",
+                     fmt::format("{:.2f}", result.predictions[0].scores.mae_mm), "mm",
                      "mean absolute error of the others' mean"});
     tiles.push_back({"at best", fmt::format("{:.2f}", BestWay(result)->scores.mae_mm), "mm",
                      WayText(BestWay(result)->name)});
@@ -62,7 +62,7 @@ ReportTable ForesightTable(const PopulationResult& result) {
       .caption = "Each subject predicted by the others, mm",
       .header = {"prediction", "depths", "MAE", "RMSE", "bias", "CRPS", "interval score",
                  "within 50 %", "90 %", "95 %", "sd stated", "MAE minus that of the mean, 95 %"}};
-  for (const Foresight& way : result.foresights) {
+  for (const PredictedSites& way : result.predictions) {
     const DepthScores& s = way.scores;
     const SampleSummary& d = way.against_mean_mm;
     table.AddRow(WayText(way.name), s.points, s.mae_mm, s.rmse_mm, s.bias_mm, s.crps_mm,
@@ -78,7 +78,7 @@ ReportTable ForesightTable(const PopulationResult& result) {
 // One row per way of predicting: the mean absolute error of each subject.
 std::vector<BoxRow> ErrorRows(const PopulationResult& result) {
   std::vector<BoxRow> rows;
-  for (const Foresight& way : result.foresights) {
+  for (const PredictedSites& way : result.predictions) {
     BoxRow& row = rows.emplace_back(BoxRow{WayText(way.name), {}, {}});
     for (std::size_t k = 0; k < way.mae_mm.size(); ++k) {
       if (std::isfinite(way.mae_mm[k])) {
@@ -93,7 +93,7 @@ std::vector<BoxRow> ErrorRows(const PopulationResult& result) {
 // One row per way that states a standard deviation: its coverage.
 std::vector<BoxRow> CoverageRows(const PopulationResult& result) {
   std::vector<BoxRow> rows;
-  for (const Foresight& way : result.foresights) {
+  for (const PredictedSites& way : result.predictions) {
     std::vector<double> errors, sds;
     for (const PredictedDepth& depth : way.depths) {
       errors.push_back(depth.predicted_mm - depth.depth_mm);
@@ -158,7 +158,7 @@ ReportSection OutlierSection(const PopulationResult& result) {
                     .header = {"subject", "site", "depth (mm)", "expected (mm)", "z"}};
   for (const Outlier& outlier : result.outliers) {
     table.AddRow(result.subjects[outlier.subject].person.name,
-                 outlier.site.empty() ? "all sites" : SiteInWords(outlier.site), outlier.depth_mm,
+                 outlier.site.empty() ? "all sites" : DescribeSite(outlier.site), outlier.depth_mm,
                  outlier.expected_mm, outlier.z);
   }
   ReportSection section{.heading = "Outliers"};
@@ -167,7 +167,7 @@ ReportSection OutlierSection(const PopulationResult& result) {
                               ? std::string("None was found.")
                               : fmt::format("The search needs at least {} subjects, because a "
                                             "median of fewer is meaningless.",
-                                            kFewestForOutliers)};
+                                            kMinSubjectsForOutliers)};
     return section;
   }
   section.paragraphs = {
@@ -238,7 +238,7 @@ std::string PopulationReport(const PopulationResult& result) {
   report.subtitle = fmt::format("A population of {} subjects", result.counted.size());
   report.notes = result.notes;
   report.tiles = Tiles(result);
-  if (!result.foresights.empty()) {
+  if (!result.predictions.empty()) {
     report.sections.push_back(ForesightSection(result));
   }
   report.sections.push_back(TableSection(result));

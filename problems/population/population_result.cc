@@ -39,7 +39,7 @@ std::vector<CountedSubject> Counted(const PopulationResult& result) {
 void NoteUnsearchedOutliers(PopulationResult& result) {
   if (!result.LooksForOutliers()) {
     result.notes.push_back(
-        fmt::format("fewer than {} subjects: outliers are not searched for", kFewestForOutliers));
+        fmt::format("fewer than {} subjects: outliers are not searched for", kMinSubjectsForOutliers));
     return;
   }
   int sites = 0, skipped = 0;
@@ -47,13 +47,13 @@ void NoteUnsearchedOutliers(PopulationResult& result) {
     const bool is_site = IsSite(result.sample.names[j]);
     sites += is_site ? 1 : 0;
     skipped +=
-        is_site && result.sample.values.col(j).array().isFinite().count() < kFewestForOutliers ? 1
+        is_site && result.sample.values.col(j).array().isFinite().count() < kMinSubjectsForOutliers ? 1
                                                                                                : 0;
   }
   if (skipped > 0) {
     result.notes.push_back(fmt::format(
         "outliers are not searched for at {} of {} sites, which fewer than {} subjects have",
-        skipped, sites, kFewestForOutliers));
+        skipped, sites, kMinSubjectsForOutliers));
   }
 }
 
@@ -125,7 +125,7 @@ std::vector<std::string> CollectNotes(const PopulationResult& result) {
                     "person has confirmed them",
                     proposed));
   }
-  for (const Foresight& way : result.foresights) {
+  for (const PredictedSites& way : result.predictions) {
     if (way.assumed > 0) {
       notes.push_back(fmt::format(
           "table {}: the sex or build of {} of {} subjects is not known; an unknown sex counts as "
@@ -136,7 +136,7 @@ std::vector<std::string> CollectNotes(const PopulationResult& result) {
   return notes;
 }
 
-std::string ScoreLine(const Foresight& way) {
+std::string ScoreLine(const PredictedSites& way) {
   const DepthScores& s = way.scores;
   if (s.points == 0) {
     return fmt::format("a subject left out, {}: no depth to compare\n", way.name);
@@ -199,7 +199,7 @@ std::string OutliersCsv(const PopulationResult& result) {
 
 std::string LeaveOneOutCsv(const PopulationResult& result) {
   CsvWriter csv({"way", "subject", "site", "depth_mm", "predicted_mm", "sd_mm"});
-  for (const Foresight& way : result.foresights) {
+  for (const PredictedSites& way : result.predictions) {
     for (const PredictedDepth& depth : way.depths) {
       csv.Row(way.name, SubjectName(result, depth.subject), depth.site, depth.depth_mm,
               depth.predicted_mm, depth.sd_mm);
@@ -229,7 +229,7 @@ std::string DenseCsv(const DepthModes& dense) {
   return csv.Text();
 }
 
-Json ScoresJson(const Foresight& way) {
+Json ScoresJson(const PredictedSites& way) {
   const DepthScores& s = way.scores;
   return {{"points", s.points},
           {"mae_mm", ScoreOrNull(s.mae_mm)},
@@ -264,7 +264,7 @@ Json SummaryJson(const PopulationResult& result) {
                {"leave_one_out", Json::object()},
                {"modes", Json::array()},
                {"notes", result.notes}};
-  for (const Foresight& way : result.foresights) {
+  for (const PredictedSites& way : result.predictions) {
     json["leave_one_out"][way.name] = ScoresJson(way);
   }
   for (const double share : result.dense.share) {
@@ -281,7 +281,7 @@ Json SummaryJson(const PopulationResult& result) {
 
 int PopulationResult::Count(const std::string& status) const { return CountOf(subjects, status); }
 
-bool PopulationResult::LooksForOutliers() const { return Count("done") >= kFewestForOutliers; }
+bool PopulationResult::LooksForOutliers() const { return Count("done") >= kMinSubjectsForOutliers; }
 
 std::string WhyNoTable(const PopulationPlan& plan, const std::vector<MeasuredSubject>& subjects) {
   const int done = CountOf(subjects, "done");
@@ -313,7 +313,7 @@ PopulationResult AnalysePopulation(const PopulationPlan& plan,
   NoteUnsearchedOutliers(result);
   HandleOutliers(result);
   result.table = MakeTissueTable(result.file, result.sample, result.joint);
-  result.foresights = LeaveOneOut(result.file, Counted(result), result.sample);
+  result.predictions = LeaveOneOut(result.file, Counted(result), result.sample);
   result.dense = FindDenseModes(result);
   result.notes = CollectNotes(result);
   return result;
@@ -327,7 +327,7 @@ std::string PopulationText(const PopulationResult& result) {
       result.counted.size(), result.table.rows.size(), 100 * result.joint.shrinkage,
       result.LooksForOutliers() ? fmt::format("{} outliers", result.outliers.size())
                                 : "outliers not searched for");
-  for (const Foresight& way : result.foresights) {
+  for (const PredictedSites& way : result.predictions) {
     text += ScoreLine(way);
   }
   for (std::size_t k = 0; k < result.dense.share.size(); ++k) {

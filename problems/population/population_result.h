@@ -24,7 +24,7 @@ struct PopulationResult {
   JointNormal joint;
   TissueTable table;
   std::vector<Outlier> outliers;  // their `subject` is an index into `subjects`
-  std::vector<Foresight> foresights;
+  std::vector<PredictedSites> predictions;
   DepthModes dense;
   std::vector<std::string> notes;
 

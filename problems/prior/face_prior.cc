@@ -222,13 +222,13 @@ void CheckNear(const CsvReader& table, const std::string& what, double distance_
 std::map<std::string, ModelPoint> ReadSites(const ModesPrior& source, const TriMesh& mean) {
   const std::string text = ReadFileBytes(Named(source.sites, "sites"));
   CsvReader table(text, source.sites.string());
-  const std::size_t site = table.ColumnOf("site"), x = table.ColumnOf("x_mm"),
-                    y = table.ColumnOf("y_mm"), z = table.ColumnOf("z_mm");
+  const std::size_t site = table.RequireColumn("site"), x = table.RequireColumn("x_mm"),
+                    y = table.RequireColumn("y_mm"), z = table.RequireColumn("z_mm");
   const MeshQuery query(mean);
   std::map<std::string, ModelPoint> sites;
   while (table.NextRow()) {
     const std::string code(table.Cell(site));
-    if (const std::string complaint = ComplaintAboutSite(code); !complaint.empty()) {
+    if (const std::string complaint = StandardSiteFault(code); !complaint.empty()) {
       table.Fail(complaint);
     }
     const MeshPoint at = query.Closest({table.Number(x), table.Number(y), table.Number(z)});
@@ -275,8 +275,8 @@ void RequireUsed(const std::map<int, Vec3>& landmarks, const std::string& name) 
 std::map<int, Vec3> ReadMultiPie(const ModesPrior& source, const TriMesh& mean) {
   const std::string text = ReadFileBytes(Named(source.features, "features"));
   CsvReader table(text, source.features.string());
-  const std::size_t number = table.ColumnOf("i_multipie"), x = table.ColumnOf("x"),
-                    y = table.ColumnOf("y"), z = table.ColumnOf("z");
+  const std::size_t number = table.RequireColumn("i_multipie"), x = table.RequireColumn("x"),
+                    y = table.RequireColumn("y"), z = table.RequireColumn("z");
   const MeshQuery query(mean);
   std::map<int, Vec3> landmarks;
   while (table.NextRow()) {

@@ -148,6 +148,6 @@ inline const PriorUse* FindPriorUse(const FaceSource& face) {
   return prior != nullptr ? &prior->use : fitted != nullptr ? &fitted->use : nullptr;
 }
 
-inline bool AsksPrior(const FaceSource& face) { return FindPriorUse(face) != nullptr; }
+inline bool UsesPrior(const FaceSource& face) { return FindPriorUse(face) != nullptr; }
 
 }  // namespace semblance

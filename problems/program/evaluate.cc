@@ -85,7 +85,7 @@ Truth ReadTruthFiles(const EvaluateOptions& options) {
     truth.scored = AllScored(truth.skin);
     return truth;
   }
-  truth.basis = BasisOf(MakeDowels(ReadLandmarks(options.landmarks).file));
+  truth.basis = MakeScoreBasis(MakeDowels(ReadLandmarks(options.landmarks).file));
   if (!truth.basis.sites) {
     throw InputError(fmt::format("{}: fewer than three landmarks do not locate the face; add some",
                                  options.landmarks.string()));
@@ -121,7 +121,7 @@ ExcludedZone ParseZone(const std::string& text) {
     throw InputError(
         fmt::format("--exclude {}: write a site and a radius of 0 to 200 mm, e.g. zy_r=15", text));
   }
-  if (const std::string complaint = ComplaintAboutSite(zone.site); !complaint.empty()) {
+  if (const std::string complaint = StandardSiteFault(zone.site); !complaint.empty()) {
     throw InputError(fmt::format("--exclude {}: {}", text, complaint));
   }
   return zone;

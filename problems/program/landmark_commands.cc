@@ -50,7 +50,7 @@ int Convert(const LandmarkArguments& a) {
   const LandmarkReading reading = ReadLandmarks(a.in, a.reading);
   const std::string bytes = EncodeLandmarks(reading.file, a.out);
   PrintEach(reading.notes, "note");
-  PrintEach(LostIn(reading.file, a.out), "not kept in this kind of file");
+  PrintEach(LostContents(reading.file, a.out), "not kept in this kind of file");
   WriteFileAtomically(a.out, bytes);
   fmt::print("{}: {} landmarks, mm, LPS\n", a.out, reading.file.landmarks.size());
   return kDone;
@@ -124,7 +124,7 @@ void PrintDifferences(const ProposeArguments& a, const LandmarkFile& file) {
 
 void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {
   const std::string bytes = EncodeLandmarks(file, out);
-  PrintEach(LostIn(file, out), "not kept in this kind of file");
+  PrintEach(LostContents(file, out), "not kept in this kind of file");
   if (const fs::path folder = fs::path(out).parent_path(); !folder.empty()) {
     fs::create_directories(folder);
   }
@@ -133,7 +133,7 @@ void WriteProposal(const ProposeArguments& a, const std::string& out, const Land
   fmt::print(
       "{}: {} sites proposed, {} absent, mm, {}. Check each on the skull and correct it; then "
       "set `proposed: false`\n",
-      out, file.landmarks.size(), file.absent.size(), AxesIn(file, out));
+      out, file.landmarks.size(), file.absent.size(), WrittenAxes(file, out));
 }
 
 std::vector<fs::path> InputsOfProposal(const ProposeArguments& a) {

@@ -44,7 +44,7 @@ struct ShellArguments {
   std::string shell;
 };
 
-CommandNode WholeProgram(const ShellArguments& a) { return TreeOf(*a.command->get_parent()); }
+CommandNode WholeProgram(const ShellArguments& a) { return MakeCommandTree(*a.command->get_parent()); }
 
 int Print(const std::string& text) {
   std::fputs(text.c_str(), stdout);
@@ -102,7 +102,7 @@ int ParseAndRun(int argc, char** argv) {
     return app.exit(e) == 0 ? kDone : kBadInput;
   } catch (const CLI::ParseError& e) {
     const std::string unknown =
-        UnknownWord(TreeOf(app), std::vector<std::string>(argv + 1, argv + argc));
+        UnknownWord(MakeCommandTree(app), std::vector<std::string>(argv + 1, argv + argc));
     return PrintError(
         Shortened(fmt::format("{}; see --help", unknown.empty() ? e.what() : unknown)), kBadInput);
   }

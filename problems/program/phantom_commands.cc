@@ -54,7 +54,7 @@ std::optional<VolumeFormat> CheckVolumeName(const std::string& name) {
     throw InputError(fmt::format(
         "--volume {}: not a plain name that ends in .nii, .nii.gz, .nrrd or .mha", name));
   }
-  return VolumeFormatOf(name);
+  return FindVolumeFormat(name);
 }
 
 // Writes under another name and renames the file, so that no incomplete file has the name.

@@ -52,7 +52,7 @@ int PrintPlan(const PopulationPlan& plan) {
 PopulationRunSummary MeasureWithProgress(const PopulationPlan& plan, const fs::path& root,
                                          const PopulationArguments& a) {
   PopulationRunOptions options = a.run;
-  const Shard shard = ShardOf(a.shard);
+  const Shard shard = ParseShard(a.shard);
   options.shard = shard.index;
   options.shards = shard.count;
   if (!a.quiet) {
@@ -154,7 +154,7 @@ int PopulationCommand(const PopulationArguments& a) {
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   PrintGathered(GatherSubjects(plan, root, {a.from.begin(), a.from.end()}), plan);
   const PopulationRunSummary summary = MeasureWithProgress(plan, root, a);
-  if (const Shard shard = ShardOf(a.shard); shard.count > 1) {
+  if (const Shard shard = ParseShard(a.shard); shard.count > 1) {
     return PrintShardState(summary, SelectShard(plan, shard), root);
   }
   const fs::path whole = fs::absolute(root).lexically_normal();

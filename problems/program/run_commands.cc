@@ -78,8 +78,8 @@ std::vector<NamedExperiment> ReadAlternatives(const std::filesystem::path& file,
                                               const Experiment& experiment) {
   ConfigErrors errors;
   const ConfigNode tree =
-      LoadConfigTree(file, arguments.overrides, ConfigTreeOf(Experiment{}), errors);
-  return AlternativesOf(experiment, file.parent_path(), tree);
+      LoadConfigTree(file, arguments.overrides, MakeConfigTree(Experiment{}), errors);
+  return MakeAlternatives(experiment, file.parent_path(), tree);
 }
 
 // Throws InputError for faults of the alternatives before the long work begins. The run itself
@@ -92,7 +92,7 @@ void RequireSoundAlternatives(const std::filesystem::path& config, const Experim
   }
   InputCheck inputs(context, &cache);
   const CheckFindings own = inputs.Look(experiment);
-  std::vector<std::string> faults = LookAtAlternatives(named, own, inputs).faults;
+  std::vector<std::string> faults = CheckAlternatives(named, own, inputs).faults;
   if (own.sound() && !faults.empty()) {
     for (std::string& fault : faults) {
       fault = fmt::format("{}: {}", config.string(), fault);
@@ -108,7 +108,7 @@ int RunCommand(const Arguments& arguments) {
   const std::vector<NamedExperiment> named = ReadAlternatives(config, arguments, experiment);
   GivenFiles given = GivenTo(experiment, config, kRunFiles);
   for (const NamedExperiment& alternative : named) {
-    std::ranges::copy(InputFilesOf(alternative.experiment), std::back_inserter(given.files));
+    std::ranges::copy(InputFiles(alternative.experiment), std::back_inserter(given.files));
   }
   StagedFolder folder =
       MakeStagedFolder(arguments, "out/" + config.stem().string(), std::move(given));
@@ -154,7 +154,7 @@ void AddMissing(std::span<const NamedFile> named, const ConfigNode& tree, Config
     const bool is_reported =
         input.option.starts_with("template.") || input.option.starts_with("bust.");
     if (!is_reported && !std::filesystem::exists(input.file, ignored)) {
-      errors.Add(LocationOf(tree, input.option), input.option,
+      errors.Add(FindLocation(tree, input.option), input.option,
                  fmt::format("no such file: {}; paths are relative to the file that names them",
                              input.file.string()));
     }
@@ -167,7 +167,7 @@ Options ReadChecked(const std::string& file, const Arguments& arguments,
                     std::vector<NamedFile> (*inputs_of)(const Options&)) {
   ConfigErrors errors;
   const ConfigNode tree =
-      LoadConfigTree(file, arguments.overrides, ConfigTreeOf(Options{}), errors);
+      LoadConfigTree(file, arguments.overrides, MakeConfigTree(Options{}), errors);
   const auto options = ReadConfigTree<Options>(tree, errors);
   if (!arguments.without_inputs) {
     AddMissing(inputs_of(options), tree, errors);
@@ -194,12 +194,12 @@ CheckFindings CheckStudy(const std::string& file, const Arguments& arguments, In
 
 CheckFindings CheckExperiment(const std::string& file, const Arguments& arguments,
                               InputCheck& inputs) {
-  const auto experiment = ReadChecked<Experiment>(file, arguments, &NamedInputsOf);
+  const auto experiment = ReadChecked<Experiment>(file, arguments, &NamedInputs);
   const std::vector<NamedExperiment> named = ReadAlternatives(file, arguments, experiment);
   CheckFindings findings;
   if (!arguments.without_inputs) {
     findings = inputs.Look(experiment);
-    findings.Add(LookAtAlternatives(named, findings, inputs));
+    findings.Add(CheckAlternatives(named, findings, inputs));
   }
   return findings;
 }
@@ -209,7 +209,7 @@ CheckFindings CheckPopulation(const std::string& file, const Arguments& argument
     throw InputError(
         fmt::format("{}: --set is for experiments and fits; write it into the population", file));
   }
-  ReadChecked<PopulationFile>(file, arguments, &NamedInputsOf);
+  ReadChecked<PopulationFile>(file, arguments, &NamedInputs);
   CheckFindings findings;
   if (!arguments.without_inputs) {
     findings.warnings = ReadPopulation(file).notes;
@@ -222,7 +222,7 @@ template <class Options>
 bool Reads(const std::string& file, const Arguments& arguments) try {
   ConfigErrors errors;
   ReadConfigTree<Options>(
-      LoadConfigTree(file, arguments.overrides, ConfigTreeOf(Options{}), errors), errors);
+      LoadConfigTree(file, arguments.overrides, MakeConfigTree(Options{}), errors), errors);
   errors.ThrowIfAny();
   return true;
 } catch (const ConfigError&) {

@@ -130,7 +130,7 @@ void PrintChange(const StudySummary& summary, const fs::path& root) {
 
 StudyRunOptions MakeRunOptions(const StudyArguments& a) {
   StudyRunOptions options = a.run;
-  const Shard shard = ShardOf(a.shard);
+  const Shard shard = ParseShard(a.shard);
   options.shard = shard.index;
   options.shards = shard.count;
   options.rerun = a.rerun == "failed"     ? Rerun::kFailed

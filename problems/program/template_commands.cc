@@ -184,7 +184,7 @@ KnownHead ReadHead(const fs::path& config, const RecentreArguments& a, const Run
 GivenFiles ListInputs(const RecentreArguments& a) {
   GivenFiles given{.files = a.heads, .outputs = kOutputs};
   for (const fs::path& config : a.heads) {
-    std::ranges::copy(InputFilesOf(ReadKnown(config, a)), std::back_inserter(given.files));
+    std::ranges::copy(InputFiles(ReadKnown(config, a)), std::back_inserter(given.files));
   }
   return given;
 }

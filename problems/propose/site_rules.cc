@@ -116,7 +116,7 @@ double Sharpness_mm(const ExtremumSearch& search, std::size_t best) {
 const SiteRule& FindSiteRule(std::string_view site) {
   const auto* const found = std::ranges::find(kRules, WithoutSide(site), &SiteRule::landmark);
   if (found == kRules.end()) {
-    throw InputError(fmt::format("site rules: {}", ComplaintAboutSite(site)));
+    throw InputError(fmt::format("site rules: {}", StandardSiteFault(site)));
   }
   return *found;
 }

@@ -50,7 +50,7 @@ void SetPathBase(const fs::path& folder, ConfigNode& node) {
 Experiment Read(const std::string& text, const Alternative& alternative, const fs::path& folder,
                 ConfigErrors& errors) {
   ConfigNode tree = LoadConfigTextTree(text, "alternative " + alternative.name, alternative.set,
-                                       ConfigTreeOf(Experiment{}), errors);
+                                       MakeConfigTree(Experiment{}), errors);
   SetPathBase(fs::current_path() / folder, tree);
   auto experiment = ReadConfigTree<Experiment>(tree, errors);
   experiment.title += " (" + alternative.name + ")";
@@ -73,11 +73,11 @@ class AlternativeFaults {
         alternative_(alternative),
         errors_(errors) {}
 
-  void Add(const std::string& what) { errors_.Add(LocationOf(tree_, at_), Name(), what); }
+  void Add(const std::string& what) { errors_.Add(FindLocation(tree_, at_), Name(), what); }
 
   void Add(const ConfigErrors& of_settings) {
     for (const ConfigFault& fault : of_settings.faults()) {
-      errors_.Add(LocationOf(tree_, at_ + SettingPath(fault)), Name(),
+      errors_.Add(FindLocation(tree_, at_ + SettingPath(fault)), Name(),
                   fault.path + (fault.path.empty() ? "" : ": ") + fault.what);
     }
   }
@@ -251,7 +251,7 @@ class ComparedPictures {
 
 }  // namespace
 
-std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const fs::path& folder,
+std::vector<NamedExperiment> MakeAlternatives(const Experiment& experiment, const fs::path& folder,
                                             const ConfigNode& tree) {
   Experiment own = experiment;
   own.alternatives.clear();
@@ -283,7 +283,7 @@ std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment, const 
   return result;
 }
 
-CheckFindings LookAtAlternatives(const std::vector<NamedExperiment>& named,
+CheckFindings CheckAlternatives(const std::vector<NamedExperiment>& named,
                                  const CheckFindings& own, InputCheck& inputs) {
   CheckFindings all;
   for (const auto& [name, experiment] : named) {

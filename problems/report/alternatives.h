@@ -24,16 +24,16 @@ struct NamedExperiment {
 // configuration as read, which gives faults their lines. Throws ConfigError with a line for each
 // fault of each alternative: a name that appears twice or cannot name a folder, a setting that does
 // not exist, another skull.
-std::vector<NamedExperiment> AlternativesOf(const Experiment& experiment,
+std::vector<NamedExperiment> MakeAlternatives(const Experiment& experiment,
                                             const std::filesystem::path& folder,
                                             const ConfigNode& tree);
 
 // Checks the inputs of the alternatives. Returns the findings that `own`, the findings of the
 // experiment itself, does not hold. Each line names its alternative.
-CheckFindings LookAtAlternatives(const std::vector<NamedExperiment>& named,
+CheckFindings CheckAlternatives(const std::vector<NamedExperiment>& named,
                                  const CheckFindings& own, InputCheck& inputs);
 
-// Runs each alternative of `named` (from AlternativesOf) and writes it into alternatives/NAME below
+// Runs each alternative of `named` (from MakeAlternatives) and writes it into alternatives/NAME below
 // the folder, as WriteRun does. Stages that an alternative shares with the run come from `cache`.
 // Then writes for the report of the run, with the run's own answer first and all pictures under one
 // camera:

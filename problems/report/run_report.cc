@@ -177,11 +177,11 @@ ReportTable DowelsTable(const std::filesystem::path& file) {
       {"landmark", "depth (mm)", "SD (mm)", "u", "v", "distance left (mm)", "role"}};
   const std::string text = ReadFileBytes(file);
   CsvReader csv(text, file.string());
-  const std::size_t site = csv.ColumnOf("site");
+  const std::size_t site = csv.RequireColumn("site");
   while (csv.NextRow()) {
     std::vector<std::string> row = {WordsOfSite(csv.Cell(site))};
     for (const char* column : {"depth_mm", "sd_mm", "u", "v", "fit_residual_mm"}) {
-      row.push_back(TableNumber(csv.NumberOrNan(csv.ColumnOf(column)), 2));
+      row.push_back(TableNumber(csv.NumberOrNan(csv.RequireColumn(column)), 2));
     }
     const auto role = csv.Find("role");  // folders of older versions have none
     row.emplace_back(role ? csv.Cell(*role) : "landmark");

@@ -54,7 +54,7 @@ ViewMeshes MakeViewMeshes(const RunResult& result, int threads) {
   ParallelFor(jobs.size(), threads, 1, [&jobs, &view](std::size_t k) {
     if (jobs[k].first != nullptr) {
       const bool head = jobs[k].second == &view.bust;
-      *jobs[k].second = ForView(*jobs[k].first, head ? kHeadTriangles : kViewTriangles);
+      *jobs[k].second = SimplifyForView(*jobs[k].first, head ? kHeadTriangles : kViewTriangles);
     }
   });
   return view;
@@ -105,7 +105,7 @@ class SceneWriter {
       for (const BoneOrigin of_triangle : result_.origin) {
         keep.push_back(of_triangle == origin);
       }
-      return ForView(Submesh(result_.shell, keep));
+      return SimplifyForView(Submesh(result_.shell, keep));
     };
     const auto [observed, mirrored, inferred] = AreaByOrigin_cm2(result_.shell, result_.origin);
     if (mirrored + inferred == 0) {

@@ -148,7 +148,7 @@ std::string QueryText(const BenchRequest& request, const char* key) {
 // Picture of the place of one site, for ?site=CODE.
 BenchReply SitePictureReply(Bench&, const BenchRequest& request) {
   static const SiteSketch kSketch = MakeSiteSketch(/*threads=*/1);
-  return {200, "image/png", EncodePng(PictureOf(kSketch, QueryText(request, "site"))), {}};
+  return {200, "image/png", EncodePng(DrawSitePicture(kSketch, QueryText(request, "site"))), {}};
 }
 
 BenchReply Schema(Bench&, const BenchRequest&) { return JsonReply(OptionsSchema<Experiment>()); }

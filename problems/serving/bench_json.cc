@@ -157,7 +157,7 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
 }
 
 std::string FaceJson(const BenchFace& face) {
-  return Json{{"mesh", BlobOfMesh(Tessellate(face.surface, kShownQuadsPerPatch).mesh)},
+  return Json{{"mesh", EncodeMeshBlob(Tessellate(face.surface, kShownQuadsPerPatch).mesh)},
               {"dowels", DowelsJson(face.dowels)},
               {"notes", face.notes},
               {"finest_level", face.surface.shape().max_level},
@@ -195,10 +195,10 @@ std::string ImportedFileJson(const ImportedFile& file) {
 std::string MeshesJson(const BenchSubject& subject) {
   Json json = {{"skull", nullptr}, {"skin", nullptr}};
   if (!subject.skull.view.triangles.empty()) {
-    json["skull"] = BlobOfMesh(subject.skull.view);
+    json["skull"] = EncodeMeshBlob(subject.skull.view);
   }
   if (subject.skin) {
-    json["skin"] = BlobOfMesh(subject.skin->view);
+    json["skin"] = EncodeMeshBlob(subject.skin->view);
   }
   return json.dump();
 }

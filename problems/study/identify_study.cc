@@ -66,7 +66,7 @@ std::shared_ptr<const KnownFaces> MakeGallery(const std::vector<GalleryEntry>& g
 }
 
 Match MakeMatch(const std::vector<double>& distances_mm, std::size_t own) {
-  Match match{.rank = RankOf(distances_mm, own), .own_mm = distances_mm[own]};
+  Match match{.rank = FindRank(distances_mm, own), .own_mm = distances_mm[own]};
   for (std::size_t k = 0; k < distances_mm.size(); ++k) {
     if (k != own) {
       match.best_other_mm = std::fmin(match.best_other_mm, distances_mm[k]);
@@ -87,7 +87,7 @@ struct Distances {
 Distances Compare(const ProbeFace& probe, const KnownFaces& gallery, const RunContext& context) {
   Distances distances;
   for (const KnownFace& known : gallery) {
-    const FaceDistance distance = DistanceOf(probe, known, context);
+    const FaceDistance distance = MeasureFaceDistance(probe, known, context);
     distances.surface_mm.push_back(distance.surface_mm);
     distances.landmarks_mm.push_back(distance.landmarks_mm);
     context.ThrowIfStopped();
@@ -153,7 +153,7 @@ IdentifyResult Identify(const Experiment& experiment, const std::vector<GalleryE
   const auto faces = MakeGallery(gallery, context, cache);
   const std::string key = GalleryKey(gallery);
   const auto ceiling = cache.Get<Distances>(fmt::format("ceiling {}\n{}", own, key), [&] {
-    return Compare(SeenAgain((*faces)[own], options.ceiling_cell_mm, options.ceiling_noise_mm,
+    return Compare(SimulateRescan((*faces)[own], options.ceiling_cell_mm, options.ceiling_noise_mm,
                              options.random_seed + own),
                    *faces, context);
   });

@@ -15,7 +15,7 @@ namespace semblance {
 
 // The distance of a probe to its person and to the others, by one measure.
 struct Match {
-  double rank = kNaN;  // rank of the person by distance (RankOf)
+  double rank = kNaN;  // rank of the person by distance (FindRank)
   double own_mm = kNaN;
   double best_other_mm = kNaN;  // NaN in a gallery of one
 };
@@ -29,7 +29,7 @@ struct IdentifyResult {
   RunResult run;
   int gallery = 0;
   ProbeMatch approximation = {};  // the recovered face
-  ProbeMatch ceiling = {};        // the true face, resampled and noisy (SeenAgain)
+  ProbeMatch ceiling = {};        // the true face, resampled and noisy (SimulateRescan)
   ProbeMatch floor = {};          // the generic face, the same for everyone
 };
 
@@ -39,7 +39,7 @@ KnownFace MakeKnownFace(const GalleryEntry& entry, const RunContext& context);
 
 // Runs the experiment, which must be that of gallery[own]. Compares its face, the ceiling and the
 // floor with every true face. `cache` shares the data of a person among trials. Throws as Run,
-// MakeKnownFace and DistanceOf do.
+// MakeKnownFace and MeasureFaceDistance do.
 IdentifyResult Identify(const Experiment& experiment, const std::vector<GalleryEntry>& gallery,
                         std::size_t own, const IdentifyOptions& options, const RunContext& context,
                         StageCache& cache);

@@ -177,7 +177,7 @@ StudyFile ReadStudyFile(const std::filesystem::path& file, ConfigNode& tree, Con
                             .folder = std::filesystem::absolute(file).parent_path()};
   tree = ParseConfigText(ReadFileBytes(file), source, errors);
   if (tree.Find("search")) {
-    errors.Add(LocationOf(tree, "search"), "search",
+    errors.Add(FindLocation(tree, "search"), "search",
                "removed in 1.0; use Optuna, as docs/examples/search_with_optuna.py does");
     std::erase_if(tree.entries, [](const auto& entry) { return entry.key == "search"; });
   }

@@ -162,7 +162,7 @@ bool IsShareWithOptions(const std::string& metric, const std::set<std::string>& 
 
 // Complains about a paired site without its side. Other names are allowed, because an experiment
 // can name its own dowels.
-std::string ComplaintAboutSite(const std::string& metric) {
+std::string StandardSiteFault(const std::string& metric) {
   constexpr std::string_view kGroup = ".sites.";
   const std::size_t at = metric.find(kGroup);
   const std::string site = at == metric.npos ? "" : metric.substr(at + kGroup.size());
@@ -183,7 +183,7 @@ std::string ComplaintAboutMetric(const std::string& metric, StudyJob job) {
     return "";
   }
   if (DependsOnSubject(metric, names)) {
-    return ComplaintAboutSite(metric);
+    return StandardSiteFault(metric);
   }
   const std::vector<std::string> known(names.begin(), names.end());
   const std::string nearest = NearestWord(metric, known);
@@ -230,7 +230,7 @@ bool IsSigned(const std::string& metric) {
 
 }  // namespace
 
-Better BetterOf(const std::string& metric) {
+Better DefaultBetter(const std::string& metric) {
   return LastPart(metric).starts_with("within_")   ? Better::kHigher
          : IsSigned(metric) || StatedShare(metric) ? Better::kNearest
                                                    : Better::kLower;
@@ -256,12 +256,12 @@ std::string Preference::InWords() const {
                                       : "lower is better";
 }
 
-std::string Preference::OfWhat() const {
+std::string Preference::TargetSuffix() const {
   return better == Better::kNearest ? fmt::format(", distance from {}", target) : "";
 }
 
 Preference PreferenceFor(const std::string& metric, std::optional<Better> given) {
-  return {.better = given.value_or(BetterOf(metric)), .target = StatedShare(metric).value_or(0)};
+  return {.better = given.value_or(DefaultBetter(metric)), .target = StatedShare(metric).value_or(0)};
 }
 
 }  // namespace semblance

@@ -27,7 +27,7 @@ constexpr auto EnumNames(Better) {
 // Decides by the name of the metric: higher for shares within a distance (face.within_2_5mm),
 // nearest for signed errors (mean_signed_mm, bias_mm, the error of a left-out site) and for
 // coverage_50, _90 and _95, lower for all others.
-Better BetterOf(const std::string& metric);
+Better DefaultBetter(const std::string& metric);
 
 // The better values of a metric, with the target of kNearest.
 struct Preference {
@@ -42,7 +42,7 @@ struct Preference {
   double Compared(double value) const;
   bool IsBetter(double compared, double than) const;  // for two results of Compared
   std::string InWords() const;                        // "nearest to 0.9 is better"
-  std::string OfWhat() const;  // suffix to the metric: ", distance from 0.9", or "" unless kNearest
+  std::string TargetSuffix() const;  // suffix to the metric: ", distance from 0.9", or "" unless kNearest
 };
 
 // Takes `given` (the user's choice) or the default of the metric. The target is that of the metric:

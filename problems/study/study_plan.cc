@@ -107,7 +107,7 @@ class ExperimentHash {
  public:
   std::string operator()(const Experiment& experiment) {
     std::string text = WriteConfig(experiment);
-    for (const fs::path& file : InputFilesOf(experiment)) {
+    for (const fs::path& file : InputFiles(experiment)) {
       const std::string name = file.string(), hash = "sha256:" + HashFile(file);
       for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at)) {
         text.replace(at, name.size(), hash);
@@ -192,7 +192,7 @@ class SubjectReader {
   }
 
   void Fail(std::string_view path, std::string_view what) const {
-    errors_.Add(LocationOf(tree_, path), path, what);
+    errors_.Add(FindLocation(tree_, path), path, what);
   }
 
   ConfigNode ReadBase() const {
@@ -253,7 +253,7 @@ std::vector<std::string> CollectAxes(const std::vector<StudyRow>& rows) {
 std::set<std::string> MissingFiles(const std::vector<StudyTrial>& trials) {
   std::set<std::string> missing;
   for (const StudyTrial& trial : trials) {
-    for (const fs::path& file : InputFilesOf(trial.experiment)) {
+    for (const fs::path& file : InputFiles(trial.experiment)) {
       if (!fs::exists(file)) {
         missing.insert(file.string());
       }
@@ -336,7 +336,7 @@ void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& pl
 void CheckMetric(const StudyFile& study, const ConfigNode& tree, ConfigErrors& errors) {
   if (const std::string complaint = ComplaintAboutMetric(study.metric, study.job);
       !complaint.empty()) {
-    errors.Add(LocationOf(tree, "metric"), "metric", complaint);
+    errors.Add(FindLocation(tree, "metric"), "metric", complaint);
   }
 }
 
@@ -382,7 +382,7 @@ void CheckSubjects(const fs::path& file, const ConfigNode& tree, WithoutSubjects
     faults.Add(fmt::format(
         "{}: metric: '{}' is measured against the true skin, which no subject has; name the skins "
         "(subject.skin), or another metric",
-        ToText(LocationOf(tree, "metric")), plan.metric));
+        ToText(FindLocation(tree, "metric")), plan.metric));
   }
 }
 
@@ -410,7 +410,7 @@ StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects) {
   ConfigErrors errors;
   ConfigNode tree;
   const StudyFile study = ReadSizedFile(file, tree, errors);
-  const ConfigNode defaults = ConfigTreeOf(Experiment{});
+  const ConfigNode defaults = MakeConfigTree(Experiment{});
   CheckMetric(study, tree, errors);
   TrialFaults faults;
   ConfigErrors base_errors;

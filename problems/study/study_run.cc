@@ -119,7 +119,7 @@ Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
 void AppendProvenance(const StudyTrial& trial, FileHashes& hashes, Json& json) {
   std::string config = WriteConfig(trial.experiment);
   json["inputs"] = Json::array();
-  for (const fs::path& file : InputFilesOf(trial.experiment)) {
+  for (const fs::path& file : InputFiles(trial.experiment)) {
     for (const fs::path& part : fs::is_directory(file) ? VolumeFiles(file) : std::vector{file}) {
       json["inputs"].push_back({{"file", part.filename().string()}, {"sha256", hashes.Of(part)}});
     }

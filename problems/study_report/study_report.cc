@@ -65,7 +65,7 @@ std::vector<double> Differences(const Treatment& treatment, const Treatment& bes
 
 ReportTable PairsTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportTable table{fmt::format("Each treatment minus the best ({}), paired by subject{}",
-                                ranked[0].label, results.preference.OfWhat()),
+                                ranked[0].label, results.preference.TargetSuffix()),
                     {"treatment", "pairs", "mean difference", "95 % interval", "worse in",
                      "Wilcoxon p", "p, Holm"}};
   std::vector<double> p;

@@ -136,7 +136,7 @@ Vec3 AverageSite(std::string_view site) {
   const std::string landmark = WithoutSide(site);
   const auto* const found = std::ranges::find(kAverageSkull, landmark, &AverageLandmark::code);
   if (found == std::end(kAverageSkull)) {
-    throw InputError(fmt::format("average skull: {}", ComplaintAboutSite(site)));
+    throw InputError(fmt::format("average skull: {}", StandardSiteFault(site)));
   }
   const bool right = SideOfSite(site) == Side::kRight;
   return {right ? -found->x : found->x, found->y, found->z};

@@ -50,7 +50,7 @@ void CheckSetSites(const std::map<std::string, double>& set_mm) {
     }
     if (!(depth_mm > 0 && std::isfinite(depth_mm))) {
       throw InputError(fmt::format("set_mm: the depth of site {} is {} mm; it must be above 0",
-                                   SiteInWords(site), depth_mm));
+                                   DescribeSite(site), depth_mm));
     }
   }
 }
@@ -70,7 +70,7 @@ void NoteUnusedSets(const TissueOptions& options, const std::vector<Dowel>& dowe
     });
     if (!used) {
       notes.Add(
-          fmt::format("set_mm: no dowel uses the depth of site {}", SiteInWords(entry.first)));
+          fmt::format("set_mm: no dowel uses the depth of site {}", DescribeSite(entry.first)));
     }
   }
 }
@@ -88,7 +88,7 @@ std::vector<Dowel*> ApplySets(const TissueOptions& options, std::vector<Dowel>& 
     }
     dowel.depth_mm = it->second;
     notes.Add(dowel.site, fmt::format("site {}: depth set to {} mm by hand",
-                                      SiteInWords(dowel.site), it->second));
+                                      DescribeSite(dowel.site), it->second));
   }
   return open;
 }
@@ -115,7 +115,7 @@ void SetDepth(const TissueTable& table, const TissueDepth& depth, double sds, Do
   if (depth.flag == CellFlag::kSuspect) {
     notes.Add(dowel.site,
               fmt::format("site {}: the depth of {:.2f} mm in table '{}' is suspect: {}",
-                          SiteInWords(dowel.site), depth.mean_mm, table.id, depth.note));
+                          DescribeSite(dowel.site), depth.mean_mm, table.id, depth.note));
   }
 }
 
@@ -169,7 +169,7 @@ void NoteLeftOut(const TissueOptions& options, const TissueTable& table,
         dowel->site,
         fmt::format("site {}: no depth in tissue table '{}' ({}); dowel left out. Name another "
                     "table in `fill_from`, or a depth in `set_mm`, to keep it",
-                    SiteInWords(dowel->site), table.id,
+                    DescribeSite(dowel->site), table.id,
                     WhyNoDepth(table, options.sex, options.build, dowel->site)));
   }
 }
@@ -189,7 +189,7 @@ std::vector<Dowel*> ApplyKnown(const TissueOptions& options, const LandmarkFile&
     dowel->sd_mm = options.given.error_mm;
     notes.Add(dowel->site,
               fmt::format("site {}: no table has a depth; the known depth of {} mm is used",
-                          SiteInWords(dowel->site), own->second));
+                          DescribeSite(dowel->site), own->second));
   }
   return left;
 }
@@ -220,7 +220,7 @@ const Landmark& LandmarkAt(const LandmarkFile& file, const std::string& site) {
     return *landmark;
   }
   throw InputError(
-      fmt::format("site {}: it has no landmark, so it has no measured depth", SiteInWords(site)));
+      fmt::format("site {}: it has no landmark, so it has no measured depth", DescribeSite(site)));
 }
 
 void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open, Notes& notes) {
@@ -234,10 +234,10 @@ void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open,
           dowel->site,
           fmt::format("site {}: no depth along the normal; {:.2f} mm to the closest skin used "
                       "instead",
-                      SiteInWords(dowel->site), dowel->depth_mm));
+                      DescribeSite(dowel->site), dowel->depth_mm));
     } else {
       notes.Add(dowel->site,
-                fmt::format("site {}: no measured depth; dowel dropped", SiteInWords(dowel->site)));
+                fmt::format("site {}: no measured depth; dowel dropped", DescribeSite(dowel->site)));
     }
   }
 }
@@ -254,14 +254,14 @@ std::vector<std::string> SitesMeant(const std::string& code) {
 }
 
 [[noreturn]] void RefuseSite(const char* option, const std::string& code) {
-  throw InputError(fmt::format("tissue.given.{}: {}", option, ComplaintAboutLandmark(code)));
+  throw InputError(fmt::format("tissue.given.{}: {}", option, SiteFault(code)));
 }
 
 void AddKnown(const char* option, const std::string& site, double depth_mm,
               std::map<std::string, double>& known) {
   if (!known.emplace(site, depth_mm).second) {
     throw InputError(fmt::format("tissue.given.{}: the depth of {} is given twice; leave one out",
-                                 option, SiteInWords(site)));
+                                 option, DescribeSite(site)));
   }
 }
 
@@ -290,7 +290,7 @@ void AddMeasured(const std::string& code, const LandmarkFile& file,
     throw InputError(fmt::format(
         "tissue.given.measured: {} has no measured depth in the landmark file; add one there, or "
         "give the depth under depths_mm",
-        SiteInWords(code)));
+        DescribeSite(code)));
   }
 }
 
@@ -371,12 +371,12 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
   return notes.Lines();
 }
 
-std::string SetFor(const TissueOptions& options, const std::string& site) {
+std::string FindSetKey(const TissueOptions& options, const std::string& site) {
   const auto set = FindSet(options, site);
   return set == options.set_mm.end() ? "" : set->first;
 }
 
-std::vector<std::filesystem::path> TablesOf(const TissueOptions& options) {
+std::vector<std::filesystem::path> TissueTableFiles(const TissueOptions& options) {
   std::vector<std::filesystem::path> tables;
   if (options.depths == DepthSource::kTable) {
     tables = {options.table, options.fill_from};

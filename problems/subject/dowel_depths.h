@@ -214,9 +214,9 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
 std::map<std::string, double> KnownDepths(const TissueGiven& given, const LandmarkFile& landmarks);
 
 // The key of set_mm that applies to the site; empty if none does.
-std::string SetFor(const TissueOptions& options, const std::string& site);
+std::string FindSetKey(const TissueOptions& options, const std::string& site);
 
 // The files of the tables that the options name and use, in the order in which they are searched.
-std::vector<std::filesystem::path> TablesOf(const TissueOptions& options);
+std::vector<std::filesystem::path> TissueTableFiles(const TissueOptions& options);
 
 }  // namespace semblance

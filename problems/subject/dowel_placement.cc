@@ -141,7 +141,7 @@ Vec3 SnapToSkull(const LandmarkFile& file, const Landmark& landmark, const MeshP
     throw InputError(fmt::format(
         "{}: site {} is {:.1f} mm from the skull, and at most {} mm are allowed "
         "(max_distance_mm); correct its point, or check that landmarks and skull share one frame",
-        FileLabel(file), SiteInWords(landmark.site), nearest.distance_mm, options.max_distance_mm));
+        FileLabel(file), DescribeSite(landmark.site), nearest.distance_mm, options.max_distance_mm));
   }
   return nearest.position;
 }
@@ -157,7 +157,7 @@ Vec3 DirectionAt(const LandmarkFile& file, const Landmark& landmark, const TriMe
     throw InputError(fmt::format(
         "{}: site {}: the skull's triangles within {} mm have no area, so they define no "
         "direction; give the landmark a normal, or increase normal_radius_mm",
-        FileLabel(file), SiteInWords(landmark.site), options.normal_radius_mm));
+        FileLabel(file), DescribeSite(landmark.site), options.normal_radius_mm));
   }
   return normal;
 }
@@ -182,7 +182,7 @@ void NoteMissingNames(const LandmarksKept& kept, std::span<const std::string> si
   for (const std::string& name : names ? names->sites : std::vector<std::string>()) {
     if (std::ranges::find(sites, name) == sites.end()) {
       notes.push_back(
-          fmt::format("landmarks.keep: the subject has no landmark at {}", SiteInWords(name)));
+          fmt::format("landmarks.keep: the subject has no landmark at {}", DescribeSite(name)));
     }
   }
 }

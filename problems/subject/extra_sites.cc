@@ -41,7 +41,7 @@ SitePlace ReadLandmarkNames(const std::vector<ConfigNode>& nodes) {
     if (!node.IsScalar() || ReadNumber(node)) {
       return {{}, {}, kForms};
     }
-    if (const std::string complaint = ComplaintAboutLandmark(node.text); !complaint.empty()) {
+    if (const std::string complaint = SiteFault(node.text); !complaint.empty()) {
       return {{}, {}, complaint};
     }
     place.landmarks.push_back(node.text);
@@ -68,10 +68,10 @@ SitePlace ReadPlace(const ConfigNode& near) {
   return ReadLandmarkNames(near.items);
 }
 
-std::vector<OptionFault> FaultsOfSites(const ExtraSites& sites) {
+std::vector<OptionFault> SiteOptionFaults(const ExtraSites& sites) {
   std::vector<OptionFault> faults;
   for (const auto& [name, site] : sites) {
-    const std::string complaint = ComplaintAboutLandmark(name);
+    const std::string complaint = SiteFault(name);
     const bool placed = site.uv || !site.near.IsNull();
     if (LacksSide(name)) {
       faults.push_back({name, complaint});
@@ -107,7 +107,7 @@ Vec3 PointNear(const std::string& site, const ConfigNode& near, std::span<const 
     if (!IsStandardSite(landmark)) {
       throw InputError(
           fmt::format("sites.{}.near: {} is not among the landmarks; place it, or name another",
-                      site, SiteInWords(landmark)));
+                      site, DescribeSite(landmark)));
     }
     average = average ? average : FitAverageSkull(standard);
     sum += average->Predicted(landmark);

@@ -72,7 +72,7 @@ void CheckValue(Report& report, const ExtraSite& site) {
 
 // Faults that the names alone reveal, for any subject; a path is "name" or "name.field". A name
 // that is no site of sites.h needs a place; without one it is a misspelt site.
-std::vector<OptionFault> FaultsOfSites(const ExtraSites& sites);
+std::vector<OptionFault> SiteOptionFaults(const ExtraSites& sites);
 
 // True if the option `hold` is set for the site.
 bool IsHeld(const ExtraSites& sites, const std::string& site);

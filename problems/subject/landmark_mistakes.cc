@@ -126,10 +126,10 @@ class MistakeSearch {
     const double same_mm = SamePoint_mm(box);
     std::vector<bool> listed(sites_.size(), false);
     for (std::size_t i = 0; i < sites_.size(); ++i) {
-      std::vector<std::string> same = {SiteInWords(sites_[i].site)};
+      std::vector<std::string> same = {DescribeSite(sites_[i].site)};
       for (std::size_t j = i + 1; j < sites_.size(); ++j) {
         if (!listed[j] && (sites_[i].point - sites_[j].point).norm() <= same_mm) {
-          same.push_back(SiteInWords(sites_[j].site));
+          same.push_back(DescribeSite(sites_[j].site));
           listed[j] = true;
         }
       }
@@ -252,7 +252,7 @@ class MistakeSearch {
       const bool free = own == sites_.end() || (own->point - predicted).norm() > 2 * kNear_mm;
       if (site != off.site && free && (off.point - predicted).norm() <= kNear_mm) {
         return fmt::format("; it lies where {} is predicted, so the names may be exchanged",
-                           SiteInWords(site));
+                           DescribeSite(site));
       }
     }
     return "";
@@ -265,7 +265,7 @@ class MistakeSearch {
         Error(
             "site {} is {:.0f} mm from where the other sites predict it, and at most {} mm are "
             "allowed (max_misfit_mm); correct its point or its name{}",
-            SiteInWords(sites_[k].site), off_mm, options_.max_misfit_mm,
+            DescribeSite(sites_[k].site), off_mm, options_.max_misfit_mm,
             SuggestExchange(sites_[k]));
       }
     }
@@ -294,7 +294,7 @@ class MistakeSearch {
         Error(
             "site {} is {:.1f} mm from the skull, and at most {} mm are allowed "
             "(max_distance_mm); correct its point",
-            SiteInWords(sites_[k].site), air_mm_[k], options_.max_distance_mm);
+            DescribeSite(sites_[k].site), air_mm_[k], options_.max_distance_mm);
       }
     }
   }

@@ -41,7 +41,7 @@ void SetLocation(const ConfigLocation& location, ConfigNode& tree) {
 
 template <class Report>
 void CheckValue(Report& report, const Landmark& landmark) {
-  if (const std::string complaint = ComplaintAboutLandmark(landmark.site); !complaint.empty()) {
+  if (const std::string complaint = SiteFault(landmark.site); !complaint.empty()) {
     report("site", complaint);
   }
   if (!landmark.Position().allFinite()) {
@@ -58,7 +58,7 @@ void CheckValue(Report& report, const Landmark& landmark) {
 
 template <class Report>
 void CheckValue(Report& report, const AbsentLandmark& absent) {
-  if (const std::string complaint = ComplaintAboutLandmark(absent.site); !complaint.empty()) {
+  if (const std::string complaint = SiteFault(absent.site); !complaint.empty()) {
     report("site", complaint);
   }
 }
@@ -110,10 +110,10 @@ LandmarkFile ReadLandmarkFileAsWritten(const std::filesystem::path& path) {
 void CheckLandmarks(std::span<const Landmark> landmarks, const std::string& file) {
   ConfigErrors errors;
   for (const Landmark& landmark : landmarks) {
-    const ConfigSource source{.name = fmt::format("{}: site {}", file, SiteInWords(landmark.site)),
+    const ConfigSource source{.name = fmt::format("{}: site {}", file, DescribeSite(landmark.site)),
                               .folder = {},
                               .has_lines = false};
-    ConfigNode tree = ConfigTreeOf(landmark);
+    ConfigNode tree = MakeConfigTree(landmark);
     SetLocation({std::make_shared<const ConfigSource>(source)}, tree);
     ReadConfigTree<Landmark>(tree, errors);
   }

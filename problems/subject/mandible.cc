@@ -48,7 +48,7 @@ Vec3 BitePoint(const LandmarkFile& file, const std::string& site) {
     throw InputError(fmt::format(
         "subject.mandible.bite_mm: the bite is the distance from pr to id, and there is no "
         "landmark {}; place it, or give opening_deg",
-        SiteInWords(site)));
+        DescribeSite(site)));
   }
   return found->Position();
 }

@@ -228,16 +228,16 @@ std::vector<std::string> StandardSiteCodes() {
   return codes;
 }
 
-std::string SiteInWords(std::string_view site) {
+std::string DescribeSite(std::string_view site) {
   const Site* const known = FindLandmark(WithoutSide(site));
   return known == nullptr ? std::string(site) : fmt::format("{} ({})", site, known->name);
 }
 
-std::string ComplaintAboutSite(std::string_view site) {
+std::string StandardSiteFault(std::string_view site) {
   return IsStandardSite(site) ? "" : UnknownSite(site, StandardSiteCodes());
 }
 
-std::string ComplaintAboutLandmark(std::string_view site) {
+std::string SiteFault(std::string_view site) {
   if (IsSite(site)) {
     return "";
   }
@@ -271,7 +271,7 @@ NamedSite FindSiteByName(std::string_view name) {
                    ? fmt::format("'{0}' is on both sides; state the side, as '{1}_l' or '{1}_r'",
                                  name, named->landmark)
                    : fmt::format("'{}' has a side, and {} lies in the midline; write '{}'", name,
-                                 SiteInWords(named->code), named->code)};
+                                 DescribeSite(named->code), named->code)};
 }
 
 std::vector<std::string> OtherSiteNames(std::string_view landmark) {

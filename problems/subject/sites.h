@@ -46,13 +46,13 @@ bool IsFurtherSite(std::string_view site);
 bool IsSite(std::string_view name);  // standard or further
 
 // "go_l (Gonion)"; a code without side also works. The code alone if the site is in neither list.
-std::string SiteInWords(std::string_view site);
+std::string DescribeSite(std::string_view site);
 
 // Empty if `site` is a standard site; otherwise the fault and the remedy.
-std::string ComplaintAboutSite(std::string_view site);
+std::string StandardSiteFault(std::string_view site);
 
 // The same where a further site is allowed too: in landmark files and depths by site.
-std::string ComplaintAboutLandmark(std::string_view site);
+std::string SiteFault(std::string_view site);
 
 // The site that a name means.
 struct NamedSite {

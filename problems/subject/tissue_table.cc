@@ -151,9 +151,9 @@ void CheckValue(Report& report, const TissueCorrelations& o) {
     if (!seen.insert(name).second) {
       report("names", fmt::format("'{}' appears twice; keep one", name));
     }
-    if (!IsCovariate(o, name) && !ComplaintAboutLandmark(name).empty()) {
+    if (!IsCovariate(o, name) && !SiteFault(name).empty()) {
       report("names", fmt::format("{}; or is it a covariate that is missing from `covariates`?",
-                                  ComplaintAboutLandmark(name)));
+                                  SiteFault(name)));
     }
   }
   for (const TissueCovariate& covariate : o.covariates) {
@@ -276,12 +276,12 @@ std::vector<std::string> TableWarnings(const TissueTable& table) {
     if (const std::string disorder = DescribeDisorder(row); !disorder.empty()) {
       warnings.push_back(
           fmt::format("tissue table '{}', {}: depth does not grow from emaciated to obese:{}",
-                      table.id, SiteInWords(row.site), disorder));
+                      table.id, DescribeSite(row.site), disorder));
     }
     for (const auto& [stratum, cell] : row.values) {
       if (cell.flag == CellFlag::kSuspect) {
         warnings.push_back(fmt::format("tissue table '{}', {}, {}: {:.2f} mm is suspect: {}",
-                                       table.id, SiteInWords(row.site), stratum,
+                                       table.id, DescribeSite(row.site), stratum,
                                        cell.mean.value_or(0), cell.note));
       }
     }

@@ -44,7 +44,7 @@ TriMesh ClusterVertices(const TriMesh& mesh, double cell_mm) {
 
 }  // namespace
 
-TriMesh ForView(const TriMesh& mesh, int most_triangles) {
+TriMesh SimplifyForView(const TriMesh& mesh, int most_triangles) {
   if (static_cast<int>(mesh.triangles.size()) <= most_triangles) {
     return mesh;
   }
@@ -125,7 +125,7 @@ std::string SceneBlobs::Add(Json blob) {
   return name;
 }
 
-std::string SceneBlobs::AddMesh(const TriMesh& mesh) { return Add(BlobOfMesh(mesh)); }
+std::string SceneBlobs::AddMesh(const TriMesh& mesh) { return Add(EncodeMeshBlob(mesh)); }
 
 std::string SceneBlobs::AddLines(std::span<const Vec3> points, std::span<const Segment> segments) {
   Json blob = PointsJson(points);
@@ -144,13 +144,13 @@ std::string SceneBlobs::AddValues(std::span<const double> values_mm) {
   return Add({{"values", Base64(bytes)}});
 }
 
-Json BlobOfMesh(const TriMesh& mesh) {
+Json EncodeMeshBlob(const TriMesh& mesh) {
   Json blob = PointsJson(mesh.points);
   blob["triangles"] = Indices(std::span<const Triangle>(mesh.triangles), mesh.points.size());
   return blob;
 }
 
-TriMesh MeshOfBlob(const Json& blob) {
+TriMesh DecodeMeshBlob(const Json& blob) {
   const auto numbers = ReadBlobNumbers(blob.at("points").get<std::string>(), 2);
   const double step = blob.at("step").get<double>();
   TriMesh mesh;

@@ -17,7 +17,7 @@ inline constexpr int kViewTriangles = 24000;  // enough for one mesh of a report
 
 // Reduces any mesh to about `most_triangles`. A mesh that cannot be decimated, e.g. because it is
 // not a manifold, gets one vertex per cell of a grid instead.
-TriMesh ForView(const TriMesh& mesh, int most_triangles = kViewTriangles);
+TriMesh SimplifyForView(const TriMesh& mesh, int most_triangles = kViewTriangles);
 
 // Collects blobs of geometry. Each Add returns the name of its blob, a hash of the content, so
 // equal blobs are stored once.
@@ -43,10 +43,10 @@ class SceneBlobs {
 };
 
 // The blob that AddMesh adds.
-nlohmann::ordered_json BlobOfMesh(const TriMesh& mesh);
+nlohmann::ordered_json EncodeMeshBlob(const TriMesh& mesh);
 
-// The inverse of BlobOfMesh. A coordinate is off by half a step at most. Throws InputError, or an
+// The inverse of EncodeMeshBlob. A coordinate is off by half a step at most. Throws InputError, or an
 // exception of the JSON library, if the blob is not a mesh.
-TriMesh MeshOfBlob(const nlohmann::ordered_json& blob);
+TriMesh DecodeMeshBlob(const nlohmann::ordered_json& blob);
 
 }  // namespace semblance

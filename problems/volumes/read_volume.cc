@@ -390,7 +390,7 @@ VolumeReading ReadFile(const fs::path& path, const RunContext& context) {
     NoteGeometry(reading.volume, reading.notes);
     return reading;
   }
-  const std::optional<VolumeFormat> format = VolumeFormatOf(path);
+  const std::optional<VolumeFormat> format = FindVolumeFormat(path);
   if (!format) {
     throw InputError(fmt::format(
         "{}: not a kind of volume that is read; allowed are a folder of DICOM files (for a "
@@ -402,7 +402,7 @@ VolumeReading ReadFile(const fs::path& path, const RunContext& context) {
 
 }  // namespace
 
-std::optional<VolumeFormat> VolumeFormatOf(const fs::path& path) {
+std::optional<VolumeFormat> FindVolumeFormat(const fs::path& path) {
   const std::string name = LowerCaseName(path);
   for (const Ending& ending : kEndings) {
     if (name.ends_with(ending.ending)) {

@@ -37,7 +37,7 @@ VolumeReading ReadVolume(const std::filesystem::path& path, const ReadVolumeOpti
                          const RunContext& context);
 
 // The format of a file with a whole volume, by the ending of its name; empty for other endings.
-std::optional<VolumeFormat> VolumeFormatOf(const std::filesystem::path& file);
+std::optional<VolumeFormat> FindVolumeFormat(const std::filesystem::path& file);
 
 // The files that ReadVolume reads: the path itself, or all files below the folder, sorted.
 std::vector<std::filesystem::path> VolumeFiles(const std::filesystem::path& path);

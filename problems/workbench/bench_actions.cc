@@ -13,7 +13,7 @@ namespace semblance {
 namespace {
 
 void CheckSite(const std::string& site) {
-  if (const std::string complaint = ComplaintAboutLandmark(site); !complaint.empty()) {
+  if (const std::string complaint = SiteFault(site); !complaint.empty()) {
     throw InputError("landmarks: " + complaint);
   }
 }
@@ -25,7 +25,7 @@ auto Find(std::vector<BenchLandmark>& landmarks, const std::string& site) {
 BenchLandmark& RequirePlaced(BenchState& state, const std::string& site) {
   const auto at = Find(state.landmarks, site);
   if (at == state.landmarks.end()) {
-    throw InputError(fmt::format("landmarks: {} is not placed", SiteInWords(site)));
+    throw InputError(fmt::format("landmarks: {} is not placed", DescribeSite(site)));
   }
   return *at;
 }

@@ -68,7 +68,7 @@ Experiment MakeExperiment(std::string_view start, const fs::path& folder, const 
   ConfigErrors errors;
   ConfigNode tree =
       ParseConfigText(start, {.name = (folder / state.start).string(), .folder = folder}, errors);
-  const ConfigNode defaults = ConfigTreeOf(Experiment{});
+  const ConfigNode defaults = MakeConfigTree(Experiment{});
   int order = 1;
   for (const BenchSetting& setting : AllSettings(state)) {
     const ConfigNode value = ParseConfigText(
@@ -86,13 +86,13 @@ void MakeRelative(ConfigNode& tree, const fs::path& folder) {
 }
 
 std::string StartConfig(const Experiment& experiment, const fs::path& folder) {
-  ConfigNode tree = ConfigTreeOf(experiment);
+  ConfigNode tree = MakeConfigTree(experiment);
   MakeRelative(tree, folder);
   return ToYaml(tree);
 }
 
 std::string ShortConfig(const Experiment& experiment, const fs::path& folder) {
-  ConfigNode tree = Difference(ConfigTreeOf(experiment), ConfigTreeOf(Experiment{}));
+  ConfigNode tree = Difference(MakeConfigTree(experiment), MakeConfigTree(Experiment{}));
   MakeRelative(tree, folder);
   return "# Made by `semblance workbench`, for `semblance run`. Missing options have their "
          "defaults.\n" +
@@ -101,7 +101,7 @@ std::string ShortConfig(const Experiment& experiment, const fs::path& folder) {
 
 std::string ExperimentJson(const Experiment& experiment) {
   static const ConfigType kType = DescribeExperiment();
-  return ValueJson(ConfigTreeOf(experiment), kType).dump();
+  return ValueJson(MakeConfigTree(experiment), kType).dump();
 }
 
 }  // namespace semblance

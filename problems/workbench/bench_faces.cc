@@ -47,7 +47,7 @@ FaceSource CoarseMethod(const Experiment& experiment) {
   // The plate passes nearly through the tips, as a fit does. A stiffer plate would hide the effect
   // of a single depth.
   constexpr double kStiffness_mm = 0.3;
-  return AsksPrior(method) ? FaceSource(CoarsePriorFace(method))
+  return UsesPrior(method) ? FaceSource(CoarsePriorFace(method))
                            : FaceSource(ThinPlateFace{.stiffness_mm = kStiffness_mm});
 }
 
@@ -85,7 +85,7 @@ BenchFace CoarseFace(const BenchSubject& subject, const Experiment& given, const
   const auto generic = cache.Get<TemplateFace>(StageKey("template", experiment.face_template), [&] {
     return LoadTemplate(experiment.face_template);
   });
-  const auto prior = GivenPrior(experiment, *generic, cache, context);
+  const auto prior = LoadExperimentPrior(experiment, *generic, cache, context);
   const TriMesh none;
   MadeFace made = MakeFace({.experiment = experiment,
                             .generic = *generic,

@@ -132,7 +132,7 @@ BenchHistory BenchFolder::Read() const {
 void BenchFolder::Write(const BenchHistory& history, const Experiment& experiment) const {
   const BenchState& state = CurrentState(history);
   const std::string text = HistoryText(history);
-  if (text.size() > kLargestConfig_bytes) {
+  if (text.size() > kMaxConfig_bytes) {
     throw InputError(fmt::format(
         "{}: the state and its last {} steps would take {} MB, too much to be read back; "
         "shorten the notes",

@@ -288,7 +288,7 @@ BenchState WithHead(BenchState state, const FileSubject& files, const std::strin
                     const fs::path& root) {
   Experiment experiment;
   experiment.subject = files;
-  ConfigNode tree = *ConfigTreeOf(experiment).Find("subject");
+  ConfigNode tree = *MakeConfigTree(experiment).Find("subject");
   MakeRelative(tree, root);
   state =
       ChangeSetting(DropSetting(std::move(state), "tissue.set_mm"), "subject", ToFlowYaml(tree));

@@ -145,14 +145,14 @@ BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& contex
     AppendMesh(ReadInMm(files.mandible.mesh, files), subject.skull.mesh);
   }
   CheckMesh(subject.skull.mesh, files.skull, subject);
-  subject.skull.view = ForView(subject.skull.mesh, kSkullTriangles);
+  subject.skull.view = SimplifyForView(subject.skull.mesh, kSkullTriangles);
   subject.bone = std::make_shared<const MeshQuery>(subject.skull.mesh);
   subject.view_bone = std::make_shared<const MeshQuery>(subject.skull.view);
   if (!files.skin.empty()) {
     context.Report("read skin");
     BenchMesh skin{.mesh = ReadInMm(files.skin, files), .view = {}};
     CheckMesh(skin.mesh, files.skin, subject);
-    skin.view = ForView(skin.mesh);
+    skin.view = SimplifyForView(skin.mesh);
     subject.skin = std::move(skin);
   }
   return subject;

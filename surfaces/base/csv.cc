@@ -50,7 +50,7 @@ std::optional<std::size_t> CsvReader::Find(std::string_view column) const {
                               : std::optional(static_cast<std::size_t>(at - columns_.begin()));
 }
 
-std::size_t CsvReader::ColumnOf(std::string_view column) const {
+std::size_t CsvReader::RequireColumn(std::string_view column) const {
   const auto found = Find(column);
   if (!found) {
     Fail(fmt::format("there is no column '{}'; there are {}", column, fmt::join(columns_, ", ")));

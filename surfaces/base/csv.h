@@ -33,7 +33,7 @@ class CsvReader {
   // Index of the column, or nothing.
   std::optional<std::size_t> Find(std::string_view column) const;
   // Index of the column; fails if the column is missing.
-  std::size_t ColumnOf(std::string_view column) const;
+  std::size_t RequireColumn(std::string_view column) const;
 
   // Reads the next row; false after the last one.
   bool NextRow();

@@ -85,7 +85,7 @@ Feature ExtractFeature(const HSplineSurface& surface, std::string name,
   CheckFeatureName(name);
   Feature feature{std::move(name), surface.shape(), {}};
   for (const auto& [vertex, offset] : surface.Offsets()) {
-    const Vec2 uv = surface.ParameterOf(vertex);
+    const Vec2 uv = surface.GrevillePoint(vertex);
     if (vertex.level >= region.first_level && vertex.level <= region.last_level &&
         Holds(region.lowest_u, region.highest_u, uv.x()) && uv.y() >= region.lowest_v &&
         uv.y() <= region.highest_v) {

@@ -30,7 +30,7 @@ void CheckShape(const HSplineShape& shape) {
     throw InputError(fmt::format("H-spline: the finest level is {}; it must be in 0..{}",
                                  shape.max_level, kMaxLevels));
   }
-  const int most = kMostPatches >> shape.max_level;
+  const int most = kMaxPatches >> shape.max_level;
   if (shape.patches_u < least_u || shape.patches_v < 1 || shape.patches_u > most ||
       shape.patches_v > most) {
     throw InputError(fmt::format(
@@ -81,7 +81,7 @@ Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, Derivati
   return stencil;
 }
 
-Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex) {
+Vec2 GrevillePoint(const HSplineShape& shape, const VertexId& vertex) {
   const double u = (vertex.i - 1.0) / shape.PatchesU(vertex.level);
   const double v = (vertex.j - 1.0) / shape.PatchesV(vertex.level);
   return {IntoUnit(u, shape.ClosedU()), std::clamp(v, 0.0, 1.0)};

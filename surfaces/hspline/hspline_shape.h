@@ -24,7 +24,7 @@ inline double IntoUnit(double x, bool closed) {
 
 // Brings an index into 0..count - 1: wraps it across the seam of a closed direction. Returns -1
 // beyond the border of an open one.
-constexpr int PlaceAmong(int count, int k, bool closed) {
+constexpr int WrapIndex(int count, int k, bool closed) {
   return closed ? ((k % count) + count) % count : k >= 0 && k < count ? k : -1;
 }
 
@@ -36,13 +36,13 @@ constexpr auto EnumNames(OffsetReference) {
 }
 
 // Patches along one side of the finest level.
-inline constexpr int kMostPatches = 8192;
+inline constexpr int kMaxPatches = 8192;
 
 // The domain is [0,1] x [0,1]; level L has patches_u 2^L x patches_v 2^L patches.
 struct HSplineShape {
   int patches_u = 8;  // on level 0; >= 1 (open) or >= 4 (closed)
   int patches_v = 8;  // on level 0; >= 1
-  int max_level = 3;  // finest level with detail, 0..8; patches << max_level <= kMostPatches
+  int max_level = 3;  // finest level with detail, 0..8; patches << max_level <= kMaxPatches
   Closure closure = Closure::kOpen;
   OffsetReference reference = OffsetReference::kFrame;
 
@@ -111,7 +111,7 @@ Stencil StencilAt(const HSplineShape& shape, int level, const Vec2& uv, Derivati
 
 // The Greville point of a control vertex: the (u,v) of its greatest influence, ((i - 1) / PatchesU,
 // (j - 1) / PatchesV), brought into the domain by IntoUnit.
-Vec2 ParameterOf(const HSplineShape& shape, const VertexId& vertex);
+Vec2 GrevillePoint(const HSplineShape& shape, const VertexId& vertex);
 
 // The net of level + 1 that describes the same surface (a knot is inserted at the midpoint of each
 // span).

@@ -70,7 +70,7 @@ struct Reference {
 };
 
 Reference FindReference(const HSplineSurface& surface, const VertexId& vertex) {
-  const Vec2 uv = surface.ParameterOf(vertex);
+  const Vec2 uv = surface.GrevillePoint(vertex);
   const SurfaceFrame frame = surface.LevelFrame(vertex.level - 1, uv);
   if (surface.shape().reference == OffsetReference::kWorld) {
     return {frame.point, Mat3::Identity()};

@@ -152,7 +152,7 @@ std::set<DomainCell> CellsWithinChord(const HSplineSurface& surface, double chor
     throw InputError(fmt::format(
         "tessellation: the chord error is {} mm; it must be above 0 and finite", chord_mm));
   }
-  if (!(CellsToChord(surface, chord_mm) <= kMostCells)) {
+  if (!(CellsToChord(surface, chord_mm) <= kMaxCells)) {
     TooFine(chord_mm);
   }
   std::set<DomainCell> cells;
@@ -174,8 +174,8 @@ void BalanceCells(const HSplineShape& shape, std::set<DomainCell>& cells) {
     for (const auto& [i, j] : {std::pair{cell.i - 1, cell.j}, std::pair{cell.i + 1, cell.j},
                                std::pair{cell.i, cell.j - 1}, std::pair{cell.i, cell.j + 1}}) {
       const DomainCell beside{cell.level,
-                              PlaceAmong(shape.PatchesU(cell.level), i, shape.ClosedU()),
-                              PlaceAmong(shape.PatchesV(cell.level), j, false)};
+                              WrapIndex(shape.PatchesU(cell.level), i, shape.ClosedU()),
+                              WrapIndex(shape.PatchesV(cell.level), j, false)};
       if (beside.i >= 0 && beside.j >= 0) {
         RefineAt(beside, cells, open);
       }

@@ -35,7 +35,7 @@ Tessellation TessellateToChord(const HSplineSurface& surface, double chord_mm, i
 using DomainCell = PatchId;
 
 inline constexpr int kDeepestCell = 16;    // level of the smallest cells
-inline constexpr double kMostCells = 1e7;  // per surface; bounds memory
+inline constexpr double kMaxCells = 1e7;  // per surface; bounds memory
 
 // The four quarters of a cell.
 std::array<DomainCell, 4> Children(const DomainCell& cell);
@@ -52,7 +52,7 @@ double CellsToChord(const HSplineSurface& surface, double chord_mm);
 
 // Covers the domain with the largest cells that lie within a patch and whose ChordBound is at most
 // chord_mm. Throws InputError for a chord that is not positive and finite, or that needs more than
-// kMostCells. The cells are counted before any is created.
+// kMaxCells. The cells are counted before any is created.
 std::set<DomainCell> CellsWithinChord(const HSplineSurface& surface, double chord_mm);
 
 // Splits cells that cover the domain until neighbours differ by at most one level, also across

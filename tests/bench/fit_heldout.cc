@@ -136,7 +136,7 @@ Measured Score(const Scene& scene, double begin, const Height& height) {
 // Nothing tuned: smoothness of the surface, its weight chosen by cross-validation, down to the
 // level that has about as many vertices as there are points.
 Measured FitScene(const Scene& scene, const SchedulePlan& plan) {
-  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = FinestLevelOf(plan)};
+  const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = FinestPlanLevel(plan)};
   const SmoothnessTerm smooth{
       .weight = AutoOr<double>::Auto(), .of = SmoothnessOf::kSurface, .length_mm = 1};
   const FitOptions options{

@@ -350,7 +350,7 @@ TEST(Run, ATemplateFromAFileGivesTheSameFaceToTheBit) {
   EXPECT_EQ(HSplineToJson(first.fit.surface), HSplineToJson(second.fit.surface));
   EXPECT_EQ(first.face.mesh.points, second.face.mesh.points);
   EXPECT_EQ(first.uncertainty->median_mm, second.uncertainty->median_mm);
-  EXPECT_THAT(InputFilesOf(from_file),
+  EXPECT_THAT(InputFiles(from_file),
               ::testing::IsSupersetOf({files.surface, files.sites, files.features}));
 }
 

@@ -110,7 +110,7 @@ TEST(PlanLaws, BothSolversFindTheSameSurfaceAndNoneMakesTheTermsDearer) {
     for (const Term& term : AllTerms()) {
       SCOPED_TRACE(NameOf(plan) + ", " + std::string(TermName(term)));
       const FitOptions options = Options(plan, term, Solver::kCeres);
-      ASSERT_TRUE(FaultsOf(options, kShape.max_level).empty());
+      ASSERT_TRUE(FindFitFaults(options, kShape.max_level).empty());
       const FitResult ceres = Fit(start, target, {}, options, {}),
                       fastest = Fit(start, target, {}, Options(plan, term, Solver::kFastest), {});
       EXPECT_TRUE(ceres.usable && fastest.usable);

@@ -160,7 +160,7 @@ TEST(Relaxation, NeverTurnsATriangleOver) {
       const DowelMesh mesh(rest, Places(target));
       ASSERT_EQ(mesh.Flips(Places(target)), 0);
       const RelaxationSummary summary =
-          Relax(rest, rest, mesh, *MovesOf(EveryRelaxation(10)[k]), target);
+          Relax(rest, rest, mesh, *EffectiveMoves(EveryRelaxation(10)[k]), target);
       EXPECT_EQ(mesh.Flips(Places(target)), 0);
       prevented += summary.flips_prevented;
       const FitResult result =
@@ -212,7 +212,7 @@ TEST(Relaxation, APointOnTheSurfaceArrivesAtIt) {
   FitTarget target{{{.label = "a", .position = rest.Point(truth), .uv = Vec2(0.45, 0.52)}}};
   const DowelMesh mesh(rest, Places(target));
   const FootpointRelaxation footpoint{{.rounds = 20, .damping = 0}};
-  const RelaxationSummary summary = Relax(rest, rest, mesh, *MovesOf(footpoint), target);
+  const RelaxationSummary summary = Relax(rest, rest, mesh, *EffectiveMoves(footpoint), target);
   EXPECT_LT((target.points[0].uv - truth).norm(), 1e-8);
   EXPECT_LT(summary.after.distance, 1e-12);
 }
@@ -225,7 +225,7 @@ TEST(Relaxation, WithoutANetworkAPointCrossesTheSeamOfATube) {
   FitTarget target{{{.label = "a", .position = rest.Point(truth), .uv = Vec2(0.97, 0.45)}}};
   const DowelMesh mesh(rest, Places(target), DowelLinks::kNone);
   const FootpointRelaxation footpoint{{.rounds = 20, .damping = 0}};
-  Relax(rest, rest, mesh, *MovesOf(footpoint), target);
+  Relax(rest, rest, mesh, *EffectiveMoves(footpoint), target);
   EXPECT_LT((target.points[0].uv - truth).norm(), 1e-8);
 }
 
@@ -319,12 +319,12 @@ TEST(Relaxation, WithoutABarrierPointsPassEachOther) {
   std::swap(target.points[27].uv, target.points[28].uv);
   const FitTarget given = target;
   NetworkMoves moves =
-      *MovesOf(FootpointRelaxation{{.rounds = 20, .damping = 0, .max_move_mm = 50}});
-  Relax(rest, rest, NetworkOf(rest, target, moves), moves, target);
+      *EffectiveMoves(FootpointRelaxation{{.rounds = 20, .damping = 0, .max_move_mm = 50}});
+  Relax(rest, rest, MakeNetwork(rest, target, moves), moves, target);
   EXPECT_GT((rest.Point(target.points[27].uv) - target.points[27].position).norm(), 1);
   target = given;
   moves.barrier = false;
-  const DowelMesh loose = NetworkOf(rest, target, moves);
+  const DowelMesh loose = MakeNetwork(rest, target, moves);
   EXPECT_TRUE(loose.triangles().empty());
   Relax(rest, rest, loose, moves, target);
   EXPECT_LT((rest.Point(target.points[27].uv) - target.points[27].position).norm(), 1e-6);

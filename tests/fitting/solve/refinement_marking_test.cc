@@ -43,7 +43,7 @@ TEST(Regions, PointsAreWithinTheToleranceOfTheirRegion) {
   EXPECT_GT(inside, 1000);
   EXPECT_FALSE(fit.surface.Offsets().empty());
   for (const auto& [vertex, offset] : fit.surface.Offsets()) {
-    const Vec2 uv = fit.surface.ParameterOf(vertex);
+    const Vec2 uv = fit.surface.GrevillePoint(vertex);
     EXPECT_TRUE(ToleranceRegion({.u = {0.6 - 0.26, 0.9 + 0.26}, .v = {0.2 - 0.26, 0.45 + 0.26}})
                     .Holds(uv.x(), uv.y()))
         << uv.transpose();

@@ -245,7 +245,7 @@ TEST(AdaptiveFit, VerticesAreFinerOnlyWhereTheyAreNeeded) {
   const FitResult tight = Fit(PlainStart(shape), target, {}, options, {});
   ASSERT_FALSE(tight.surface.Offsets(3).empty());
   for (const auto& [vertex, offset] : tight.surface.Offsets(3)) {
-    EXPECT_LT((tight.surface.ParameterOf(vertex) - Vec2(0.7, 0.3)).norm(), 0.35);
+    EXPECT_LT((tight.surface.GrevillePoint(vertex) - Vec2(0.7, 0.3)).norm(), 0.35);
   }
   std::get<AdaptivePlan>(options.plan).margin = 2;
   const FitResult wide = Fit(PlainStart(shape), target, {}, options, {});

@@ -40,7 +40,7 @@ TEST(MetricDistortion, CoversOnlyTheWantedPlaces) {
   HSplineSurface surface = rest;
   // The offset moves columns 6..9 of 16 and rows 2..5 of 12 of the patches.
   surface.SetOffsets({{{2, 9, 5}, Vec3(1, 2, 3)}});
-  const Vec3 place = rest.Point(rest.ParameterOf({2, 9, 5}));
+  const Vec3 place = rest.Point(rest.GrevillePoint({2, 9, 5}));
   const auto near = [&](const Vec3& p) { return (p - place).norm() < 8; };
   const auto far = [&](const Vec3& p) { return p.z() > 60; };
   const MetricDistortion all = MeasureDistortion(surface, rest, kEverywhere),

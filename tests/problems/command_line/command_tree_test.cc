@@ -62,7 +62,7 @@ TEST(CommandTree, HasTheAllowedWordsOfAnOption) {
   app.add_option("--word", word, "one of two")->check(CLI::IsMember({"a", "b c"}));
   app.add_option("--side", side, "of the head")->transform(CLI::CheckedTransformer(sides));
   app.add_option("--file", file, "any");
-  const CommandNode tool = TreeOf(app);
+  const CommandNode tool = MakeCommandTree(app);
   using Words = std::vector<std::string>;
   ASSERT_EQ(tool.options.size(), 4U);  // the first is --help
   EXPECT_EQ(tool.options[1].choices, (Words{"a", "b c"}));

@@ -149,7 +149,7 @@ TEST_F(InputCheckTest, NoOptionMayNameAMissingFile) {
         "prior: {type: hspline, modes: none.x}",
         "interp: {type: depth_map, file: none.x, mesh: none.x}"}) {
     const Experiment experiment = Of(text + "\n");
-    const auto named = NamedInputsOf(experiment);
+    const auto named = NamedInputs(experiment);
     const auto times = std::sregex_iterator(text.begin(), text.end(), word);
     EXPECT_EQ(named.size(), static_cast<std::size_t>(std::distance(times, {}))) << text;
     EXPECT_FALSE(InputCheck({}).Look(experiment).sound()) << text;
@@ -166,7 +166,7 @@ TEST_F(InputCheckTest, TemplateAndBustAreReadWithTheOptions) {
 }
 
 TEST_F(InputCheckTest, AnUnusedTableIsNoInput) {
-  EXPECT_THAT(NamedInputsOf(Of("tissue: {depths: measured, table: none.x}\n")), IsEmpty());
+  EXPECT_THAT(NamedInputs(Of("tissue: {depths: measured, table: none.x}\n")), IsEmpty());
 }
 
 }  // namespace

@@ -61,13 +61,13 @@ LandmarkFile SampleFile() {
 
 class EveryKind : public LandmarkReadingTest, public ::testing::WithParamInterface<const char*> {};
 
-// A written file is read back with the same bits, except for the contents that LostIn names.
+// A written file is read back with the same bits, except for the contents that LostContents names.
 TEST_P(EveryKind, ReadsWhatItWrites) {
   const LandmarkFile file = SampleFile();
   const std::string name = fmt::format("sample{}", GetParam());
   const LandmarkReading back = Read(name, EncodeLandmarks(file, name));
   ASSERT_EQ(back.file.landmarks.size(), file.landmarks.size());
-  const bool keeps_all = LostIn(file, name).empty();
+  const bool keeps_all = LostContents(file, name).empty();
   for (std::size_t k = 0; k < file.landmarks.size(); ++k) {
     const Landmark &a = file.landmarks[k], &b = back.file.landmarks[k];
     EXPECT_EQ(a.site, b.site);
@@ -107,22 +107,22 @@ TEST_P(EveryKind, HoldsTheSamePointsWhateverTheAxes) {
       EXPECT_EQ(back.file.landmarks[k].normal, lps.landmarks[k].normal);
     }
   }
-  const bool says_ras = AxesIn(ras, name) == "RAS";
+  const bool says_ras = WrittenAxes(ras, name) == "RAS";
   EXPECT_EQ(says_ras, name.ends_with(".yaml") || name.ends_with(".yml"));
-  EXPECT_EQ(says_ras, LostIn(ras, name) == LostIn(lps, name));
+  EXPECT_EQ(says_ras, LostContents(ras, name) == LostContents(lps, name));
 }
 
 TEST_F(LandmarkReadingTest, ListsWhatAFileLoses) {
   LandmarkFile file = SampleFile();
-  EXPECT_THAT(LostIn(file, "a.csv"), IsEmpty());
-  EXPECT_THAT(LostIn(file, "a.fcsv"),
+  EXPECT_THAT(LostContents(file, "a.csv"), IsEmpty());
+  EXPECT_THAT(LostContents(file, "a.fcsv"),
               ElementsAre("normals, depths and certainties of 32 landmarks"));
-  EXPECT_THAT(LostIn(file, "a.pp"), ElementsAre(HasSubstr("normals"), "notes of 32 landmarks"));
+  EXPECT_THAT(LostContents(file, "a.pp"), ElementsAre(HasSubstr("normals"), "notes of 32 landmarks"));
   file.absent.push_back({"g", "gone"});
-  EXPECT_THAT(LostIn(file, "a.csv"), ElementsAre(HasSubstr("1 sites")));
-  EXPECT_THAT(LostIn(file, "a.yaml"), IsEmpty());
+  EXPECT_THAT(LostContents(file, "a.csv"), ElementsAre(HasSubstr("1 sites")));
+  EXPECT_THAT(LostContents(file, "a.yaml"), IsEmpty());
   file.axes = "RAS";
-  EXPECT_THAT(LostIn(file, "a.pp"), ::testing::Contains(HasSubstr("turned to LPS")));
+  EXPECT_THAT(LostContents(file, "a.pp"), ::testing::Contains(HasSubstr("turned to LPS")));
 }
 
 TEST_F(LandmarkReadingTest, SlicersAxesAreThoseOfTheFile) {

@@ -68,7 +68,7 @@ class OneSite : public ::testing::Test {
 TEST_F(OneSite, IsMarkedOnBothPicturesAtOneHeight) {
   for (const auto* const list : {&StandardSites(), &FurtherSites()}) {
     for (const Site& site : *list) {
-      const Image image = PictureOf(Sketch(), site.code);
+      const Image image = DrawSitePicture(Sketch(), site.code);
       ASSERT_EQ(image.width, 440);
       ASSERT_EQ(image.height, 260);
       const Red front = RedIn(image, 0, 220), side = RedIn(image, 220, 440);
@@ -83,8 +83,8 @@ TEST_F(OneSite, IsMarkedOnBothPicturesAtOneHeight) {
 // middle.
 TEST_F(OneSite, IsOnItsSideAndItsMirrorOnTheOther) {
   for (const Site& site : StandardSites()) {
-    const double x = RedIn(PictureOf(Sketch(), site.code), 0, 220).x - 109.5;
-    const double mirror = RedIn(PictureOf(Sketch(), site.mirror), 0, 220).x - 109.5;
+    const double x = RedIn(DrawSitePicture(Sketch(), site.code), 0, 220).x - 109.5;
+    const double mirror = RedIn(DrawSitePicture(Sketch(), site.mirror), 0, 220).x - 109.5;
     EXPECT_NEAR(x, -mirror, 6) << site.code;
     if (site.side != Side::kMidline) {
       EXPECT_GT(site.side == Side::kLeft ? x : -x, 15) << site.code;
@@ -113,9 +113,9 @@ TEST_F(OneSite, FurtherOnesLieOnBoneWhereTheirDefinitionSays) {
 }
 
 TEST_F(OneSite, AnUnknownOneIsRefusedInWords) {
-  EXPECT_THAT(WordsOf<InputError>([] { PictureOf(Sketch(), "gonion"); }),
+  EXPECT_THAT(WordsOf<InputError>([] { DrawSitePicture(Sketch(), "gonion"); }),
               HasSubstr("unknown site 'gonion'"));
-  EXPECT_THAT(WordsOf<InputError>([] { PictureOf(Sketch(), "go"); }), HasSubstr("go_l"));
+  EXPECT_THAT(WordsOf<InputError>([] { DrawSitePicture(Sketch(), "go"); }), HasSubstr("go_l"));
 }
 
 }  // namespace

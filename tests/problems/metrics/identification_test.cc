@@ -30,14 +30,14 @@ KnownFace PersonOf(std::uint64_t random_seed) {
 
 TEST(Identification, TheRankIsOnePlusThoseThatAreCloser) {
   const std::vector<double> distances = {3, 1, 2, 4};
-  EXPECT_EQ(RankOf(distances, 1), 1);
-  EXPECT_EQ(RankOf(distances, 2), 2);
-  EXPECT_EQ(RankOf(distances, 3), 4);
+  EXPECT_EQ(FindRank(distances, 1), 1);
+  EXPECT_EQ(FindRank(distances, 2), 2);
+  EXPECT_EQ(FindRank(distances, 3), 4);
 }
 
 TEST(Identification, TiesGetTheMeanRankAndWhatIsNotFiniteComesLast) {
-  EXPECT_EQ(RankOf(std::vector<double>{5, 5, 5, 5, 5}, 2), ChanceRank(5));
-  EXPECT_EQ(RankOf(std::vector<double>{kNaN, 1, 2}, 0), 3);
+  EXPECT_EQ(FindRank(std::vector<double>{5, 5, 5, 5, 5}, 2), ChanceRank(5));
+  EXPECT_EQ(FindRank(std::vector<double>{kNaN, 1, 2}, 0), 3);
 }
 
 TEST(Identification, TheCurveRisesToOne) {
@@ -60,7 +60,7 @@ TEST(Identification, OneFaceForAllRanksByChance) {
   double sum = 0;
   std::vector<double> ranks;
   for (std::size_t own = 0; own < distances.size(); ++own) {
-    ranks.push_back(RankOf(distances, own));
+    ranks.push_back(FindRank(distances, own));
     sum += ranks.back();
   }
   EXPECT_EQ(sum / 5, ChanceRank(5));
@@ -77,7 +77,7 @@ TEST(Identification, TheSameFaceIsNoDistanceAwayWhereverItLies) {
   for (auto& [site, point] : probe.points) {
     point = away * point;
   }
-  const FaceDistance distance = DistanceOf(probe, known, {});
+  const FaceDistance distance = MeasureFaceDistance(probe, known, {});
   EXPECT_LT(distance.surface_mm, 1e-3);
   EXPECT_LT(distance.landmarks_mm, 1e-9);
 }
@@ -89,15 +89,15 @@ TEST(Identification, ALargerFaceIsAnotherFace) {
   for (auto& [site, point] : probe.points) {
     point = larger * point;
   }
-  const FaceDistance distance = DistanceOf(probe, known, {});
+  const FaceDistance distance = MeasureFaceDistance(probe, known, {});
   EXPECT_GT(distance.surface_mm, 0.5);
   EXPECT_GT(distance.landmarks_mm, 2);
 }
 
 TEST(Identification, SeenAgainAFaceIsCloserToItselfThanToAnother) {
   const KnownFace one = PersonOf(1), two = PersonOf(2);
-  const ProbeFace again = SeenAgain(one, 3, 0.5, 7);
-  const FaceDistance own = DistanceOf(again, one, {}), other = DistanceOf(again, two, {});
+  const ProbeFace again = SimulateRescan(one, 3, 0.5, 7);
+  const FaceDistance own = MeasureFaceDistance(again, one, {}), other = MeasureFaceDistance(again, two, {});
   EXPECT_GT(own.surface_mm, 0.05);
   EXPECT_LT(own.surface_mm, other.surface_mm);
   EXPECT_LT(own.landmarks_mm, other.landmarks_mm);
@@ -105,7 +105,7 @@ TEST(Identification, SeenAgainAFaceIsCloserToItselfThanToAnother) {
 
 TEST(Identification, WithoutCommonLandmarksThereIsNoDistance) {
   const KnownFace known = PersonOf(1);
-  EXPECT_THROW(DistanceOf({.mesh = known.skin, .points = {}}, known, {}), InputError);
+  EXPECT_THROW(MeasureFaceDistance({.mesh = known.skin, .points = {}}, known, {}), InputError);
 }
 
 }  // namespace

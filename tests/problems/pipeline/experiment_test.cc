@@ -132,7 +132,7 @@ TEST(Experiment, ThePublishedWayIsOneBaseAway) {
   EXPECT_TRUE(std::holds_alternative<RestoreFeatures>(published.fit.features));
   EXPECT_TRUE(std::holds_alternative<NoRelaxation>(published.fit.relaxation));
   EXPECT_EQ(published.seeds.weight, 1);
-  const std::vector<ScheduleStep> steps = StepsOf(published.fit.plan), thesis = PublishedSchedule();
+  const std::vector<ScheduleStep> steps = PlanSteps(published.fit.plan), thesis = PublishedSchedule();
   ASSERT_EQ(steps.size(), thesis.size());
   for (std::size_t k = 0; k < steps.size(); ++k) {
     EXPECT_EQ(steps[k].level, thesis[k].level);
@@ -268,7 +268,7 @@ class StatedDefaults {
 
 TEST(Experiment, TheReferenceAndTheSchemaStateTheDefaultsThatResolvedYamlHas) {
   StatedDefaults defaults;
-  defaults.Check(ConfigTreeOf(Experiment{}), Json::parse(OptionsSchema<Experiment>()), "", "");
+  defaults.Check(MakeConfigTree(Experiment{}), Json::parse(OptionsSchema<Experiment>()), "", "");
   EXPECT_GT(defaults.checked, 60);
   EXPECT_THAT(OptionsReference<Experiment>(), HasSubstr("\nseeds.weight: number, default 0.1,"));
 }

@@ -37,8 +37,8 @@ std::vector<CountedSubject> People(int count) {
   return people;
 }
 
-const Foresight& Way(const std::vector<Foresight>& ways, const std::string& name) {
-  return *std::ranges::find(ways, name, &Foresight::name);
+const PredictedSites& Way(const std::vector<PredictedSites>& ways, const std::string& name) {
+  return *std::ranges::find(ways, name, &PredictedSites::name);
 }
 
 TEST(LeaveOneOut, KnownFactsHelpAndTheStatedIntervalsHold) {
@@ -49,7 +49,7 @@ TEST(LeaveOneOut, KnownFactsHelpAndTheStatedIntervalsHold) {
   EXPECT_LT(Way(ways, "person").scores.mae_mm, Way(ways, "mean").scores.mae_mm);
   EXPECT_LT(Way(ways, "known").scores.mae_mm, Way(ways, "person").scores.mae_mm);
   EXPECT_LT(Way(ways, "known").against_mean_mm.mean_95.high, 0);
-  for (const Foresight& way : ways) {
+  for (const PredictedSites& way : ways) {
     EXPECT_NEAR(way.scores.coverage_90, 0.9, 0.04) << way.name;  // shrunk: a little cautious
     EXPECT_EQ(way.scores.points, 60 * (32 - 6)) << way.name;     // g, pg, zy and go know themselves
   }

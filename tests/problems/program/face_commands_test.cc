@@ -72,7 +72,7 @@ TEST_F(FaceCommands, EditResetsARegionAndItsInverseRestoresIt) {
   ExpectDone("edit face.json reset.yaml --out smooth.json --inverse inverse.yaml");
   const HSplineSurface smooth = ReadHSpline(folder_ / "smooth.json");
   for (const auto& [vertex, offset] : face_.Offsets()) {
-    EXPECT_EQ(smooth.Offset(vertex).has_value(), smooth.ParameterOf(vertex).x() > 0.5);
+    EXPECT_EQ(smooth.Offset(vertex).has_value(), smooth.GrevillePoint(vertex).x() > 0.5);
   }
   ExpectDone("edit smooth.json inverse.yaml --out back.json");
   EXPECT_EQ(Bytes("back.json"), Bytes("face.json"));

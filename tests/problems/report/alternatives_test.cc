@@ -46,10 +46,10 @@ const fs::path kTable = kConfigs / "tables/rhine_caucasoid.yaml";
 std::vector<NamedExperiment> Named(const std::string& file) {
   ConfigErrors errors;
   const ConfigNode tree =
-      LoadConfigTextTree(file, kConfigs / "mine.yaml", {}, ConfigTreeOf(Experiment{}), errors);
+      LoadConfigTextTree(file, kConfigs / "mine.yaml", {}, MakeConfigTree(Experiment{}), errors);
   const auto experiment = ReadConfigTree<Experiment>(tree, errors);
   errors.ThrowIfAny();
-  return AlternativesOf(experiment, kConfigs, tree);
+  return MakeAlternatives(experiment, kConfigs, tree);
 }
 
 constexpr char kBase[] = "base: phantom.yaml\nsubject: {type: phantom, rings: 24}\n";
@@ -57,7 +57,7 @@ constexpr char kBase[] = "base: phantom.yaml\nsubject: {type: phantom, rings: 24
 TEST(Alternatives, AreTheExperimentWithTheirSettings) {
   const Experiment experiment = SmallPhantom(
       {"alternatives=[{name: fat, set: [\"tissue.build=obese\", \"tissue.sex=female\"]}]"});
-  const auto named = AlternativesOf(experiment, kConfigs, {});
+  const auto named = MakeAlternatives(experiment, kConfigs, {});
   ASSERT_EQ(named.size(), 1u);
   EXPECT_EQ(named[0].name, "fat");
   EXPECT_EQ(named[0].experiment.tissue.build, Build::kObese);
@@ -69,7 +69,7 @@ TEST(Alternatives, AreTheExperimentWithTheirSettings) {
 TEST(Alternatives, PathsStartAtTheConfigurationsFolder) {
   const Experiment experiment = SmallPhantom(
       {"alternatives=[{name: other, set: [\"tissue.table=tables/t_table_2023.yaml\"]}]"});
-  EXPECT_EQ(AlternativesOf(experiment, kConfigs, {})[0].experiment.tissue.table,
+  EXPECT_EQ(MakeAlternatives(experiment, kConfigs, {})[0].experiment.tissue.table,
             kConfigs / "tables/t_table_2023.yaml");
 }
 
@@ -77,13 +77,13 @@ TEST(Alternatives, PathsStartAtTheConfigurationsFolder) {
 TEST(Alternatives, PathsOfAnEmptyFolderStartAtTheWorkingFolder) {
   const Experiment experiment =
       SmallPhantom({"alternatives=[{name: other, set: [\"tissue.table=mine.yaml\"]}]"});
-  EXPECT_EQ(AlternativesOf(experiment, "", {})[0].experiment.tissue.table,
+  EXPECT_EQ(MakeAlternatives(experiment, "", {})[0].experiment.tissue.table,
             fs::current_path() / "mine.yaml");
 }
 
 TEST(Alternatives, AreCheckedBeforeAnythingRuns) {
   const auto of = [](const char* alternatives) {
-    AlternativesOf(SmallPhantom({std::string("alternatives=") + alternatives}), kConfigs, {});
+    MakeAlternatives(SmallPhantom({std::string("alternatives=") + alternatives}), kConfigs, {});
   };
   EXPECT_THAT([&] { of("[{name: a, set: [\"tissue.build=thin\"]}]"); },
               ThrowsMessage<ConfigError>(HasSubstr("tissue.build")));
@@ -120,7 +120,7 @@ TEST(Alternatives, TheirInputsAreCheckedAndReportedByName) {
                   kBase, kTable.string()));
   InputCheck inputs({});
   const CheckFindings own = inputs.Look(SmallPhantom({})),
-                      found = LookAtAlternatives(named, own, inputs);
+                      found = CheckAlternatives(named, own, inputs);
   EXPECT_TRUE(own.sound());
   EXPECT_THAT(found.faults,
               ElementsAre(AllOf(HasSubstr("alternative 'gone': "), HasSubstr("none.yaml")),
@@ -138,7 +138,7 @@ TEST(Alternatives, LieBelowTheRunAndListLeftOutSites) {
   RunResult own = semblance::Run(experiment, {}, &cache);
   own.implicit.notes = {"of the implicit face"};
   EXPECT_THAT(
-      RunAlternatives(experiment, AlternativesOf(experiment, kConfigs, {}), own, cache, folder, {}),
+      RunAlternatives(experiment, MakeAlternatives(experiment, kConfigs, {}), own, cache, folder, {}),
       ElementsAre());
   const auto json = nlohmann::json::parse(ReadFileBytes(scratch / "out/alternatives.json"));
   ASSERT_EQ(json.size(), 3u);
@@ -162,7 +162,7 @@ TEST(Alternatives, SitesWithoutADepthInTheRunsTableAreLeftOut) {
   OutputFolder folder(scratch / "out", WhenNotEmpty::kRefuse);
   StageCache cache(16);
   const RunResult own = semblance::Run(experiment, {}, &cache);
-  RunAlternatives(experiment, AlternativesOf(experiment, kConfigs, {}), own, cache, folder, {});
+  RunAlternatives(experiment, MakeAlternatives(experiment, kConfigs, {}), own, cache, folder, {});
   const auto json = nlohmann::json::parse(ReadFileBytes(scratch / "out/alternatives.json"));
   EXPECT_THAT(json[0]["left_out"], Contains("iM2_l"));
   EXPECT_EQ(json[0]["left_out"], json[1]["left_out"]);

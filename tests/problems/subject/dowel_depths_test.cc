@@ -148,7 +148,7 @@ TEST(FillDepths, ASecondTableFillsOnlyWhatTheFirstLacks) {
   EXPECT_THAT(s.Depths(), ElementsAre(5.5, 4.25, 4.25, 12.5));
   EXPECT_TRUE(std::isnan(s.dowels[1].sd_mm));
   EXPECT_EQ(s.dowels[3].sd_mm, 6);
-  EXPECT_THAT(TablesOf(options), ElementsAre(options.table, options.fill_from));
+  EXPECT_THAT(TissueTableFiles(options), ElementsAre(options.table, options.fill_from));
 }
 
 TEST(FillDepths, ADepthOfOneSidePrecedesThatOfThePair) {

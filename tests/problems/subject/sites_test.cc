@@ -44,26 +44,26 @@ TEST(Sites, TheMirrorOfAMirrorIsTheSite) {
 }
 
 TEST(Sites, AreDescribedWithTheirName) {
-  EXPECT_EQ(SiteInWords("zy_r"), "zy_r (Zygomatic Arch, midway)");
-  EXPECT_EQ(SiteInWords("go"), "go (Gonion)");
-  EXPECT_EQ(SiteInWords("mmb_l"), "mmb_l (Mid-mandibular border)");
-  EXPECT_EQ(SiteInWords("mine"), "mine");
+  EXPECT_EQ(DescribeSite("zy_r"), "zy_r (Zygomatic Arch, midway)");
+  EXPECT_EQ(DescribeSite("go"), "go (Gonion)");
+  EXPECT_EQ(DescribeSite("mmb_l"), "mmb_l (Mid-mandibular border)");
+  EXPECT_EQ(DescribeSite("mine"), "mine");
 }
 
 TEST(Sites, FurtherSitesAreThoseOfTheTables) {
   EXPECT_EQ(FurtherSites().size(), 13u);
   for (const Site& site : FurtherSites()) {
     EXPECT_TRUE(IsFurtherSite(site.code) && !IsStandardSite(site.code)) << site.code;
-    EXPECT_EQ(ComplaintAboutLandmark(site.code), "");
-    EXPECT_THAT(ComplaintAboutSite(site.code), HasSubstr("unknown site"));
+    EXPECT_EQ(SiteFault(site.code), "");
+    EXPECT_THAT(StandardSiteFault(site.code), HasSubstr("unknown site"));
   }
-  EXPECT_THAT(ComplaintAboutLandmark("mmb"), HasSubstr("write 'mmb_l' or 'mmb_r'"));
+  EXPECT_THAT(SiteFault("mmb"), HasSubstr("write 'mmb_l' or 'mmb_r'"));
 }
 
 TEST(Sites, AFaultSaysWhatToWrite) {
-  EXPECT_EQ(ComplaintAboutSite("go_l"), "");
-  EXPECT_EQ(ComplaintAboutSite("go"), "site 'go' is on both sides; write 'go_l' or 'go_r'");
-  EXPECT_THAT(ComplaintAboutSite("gp_l"), HasSubstr("unknown site 'gp_l'"));
+  EXPECT_EQ(StandardSiteFault("go_l"), "");
+  EXPECT_EQ(StandardSiteFault("go"), "site 'go' is on both sides; write 'go_l' or 'go_r'");
+  EXPECT_THAT(StandardSiteFault("gp_l"), HasSubstr("unknown site 'gp_l'"));
 }
 
 TEST(Sites, EachIsFoundByItsCodeAndIsTheMirrorOfItsMirror) {

@@ -217,10 +217,10 @@ TEST_F(ReadVolumeTest, AFileCutShortIsAClearError) {
 
 TEST_F(ReadVolumeTest, AVolumeIsWrittenAndReadBackWithItsPlace) {
   for (const char* name : {"head.nii.gz", "head.nrrd", "head.mha"}) {
-    WriteImageVolume(head_.volume, folder_ / name, VolumeFormatOf(name).value());
+    WriteImageVolume(head_.volume, folder_ / name, FindVolumeFormat(name).value());
     ExpectTheHead(Read(name));
   }
-  EXPECT_FALSE(VolumeFormatOf("head.dcm"));
+  EXPECT_FALSE(FindVolumeFormat("head.dcm"));
   EXPECT_THROW(WriteImageVolume(head_.volume, folder_ / "no/head.nrrd", VolumeFormat::kNrrd),
                IoError);
 }

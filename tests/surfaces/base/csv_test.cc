@@ -67,7 +67,7 @@ TEST(Csv, ReadsTablesOfSpreadsheets) {
       "a, b\r\n 1 ,\"2\" \r\n+3,-4e1",
       "t.csv");
   ASSERT_TRUE(reader.NextRow());
-  EXPECT_EQ(reader.Number(reader.ColumnOf("b")), 2);
+  EXPECT_EQ(reader.Number(reader.RequireColumn("b")), 2);
   ASSERT_TRUE(reader.NextRow());
   EXPECT_EQ(reader.Number(0), 3);
   EXPECT_EQ(reader.Number(1), -40);
@@ -86,7 +86,7 @@ TEST(Csv, FaultsNameTheirLine) {
   }
   EXPECT_THAT(FaultOf("a\n\"1\n\"\n"), HasSubstr("t.csv:2: column 'a'"));
   CsvReader reader("a,b\n", "t.csv");
-  EXPECT_THROW(reader.ColumnOf("c"), IoError);
+  EXPECT_THROW(reader.RequireColumn("c"), IoError);
 }
 
 // Half a million names are compared by a set, not pair by pair.

@@ -62,7 +62,7 @@ TEST_P(FeatureLaws, ARegionHoldsItsVerticesAndNoOthers) {
   const FeatureRegion region{.lowest_u = 0.7, .highest_u = 0.2, .highest_v = 0.6, .first_level = 2};
   const Feature feature = ExtractFeature(face, "nose", region);
   for (const auto& [vertex, offset] : face.Offsets()) {
-    const Vec2 uv = face.ParameterOf(vertex);
+    const Vec2 uv = face.GrevillePoint(vertex);
     const bool inside = vertex.level >= 2 && (uv.x() >= 0.7 || uv.x() <= 0.2) && uv.y() <= 0.6;
     EXPECT_EQ(feature.offsets.contains(vertex), inside);
   }

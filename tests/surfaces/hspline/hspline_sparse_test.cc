@@ -158,7 +158,7 @@ TEST_P(DeepHSpline, RefinementToLevelEightNeverChangesTheShape) {
     const VertexId center = Near(level, place);
     const PatchId patch{level, shape().Column(level, center.i - 1), center.j - 1};
     const Vec3 refined = after.PatchVertices(patch)[5];
-    const SurfaceFrame frame = after.LevelFrame(level - 1, after.ParameterOf(center));
+    const SurfaceFrame frame = after.LevelFrame(level - 1, after.GrevillePoint(center));
     const bool world = shape().reference == OffsetReference::kWorld;
     const Mat3 axes = world ? Mat3::Identity() : frame.axes;
     after.SetOffsets({{center, Vec3(axes.transpose() * (refined - frame.point))}});
@@ -182,7 +182,7 @@ TEST_P(DeepHSpline, AnEditOfLevelEightMovesItsOverlayAndNotOneBitElsewhere) {
   vertex.i |= 1;  // odd: it lies on a vertex of level 7, the center of an overlay
   vertex.j |= 1;
   after.SetOffsets({{vertex, Vec3(0, 0, 1)}});
-  const Vec2 center = before.ParameterOf(vertex);
+  const Vec2 center = before.GrevillePoint(vertex);
   const double side_u = 1.0 / shape().PatchesU(kFinest - 1),
                side_v = 1.0 / shape().PatchesV(kFinest - 1);
   int touched = 0;

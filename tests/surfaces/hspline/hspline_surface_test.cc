@@ -132,7 +132,7 @@ TEST_P(HSplineLaws, AnEditTouchesTheFourPatchesOfItsParentLevelAndNothingElse) {
   // odd: it lies on a vertex of level 1, the center of an overlay, near any seams
   const VertexId vertex{2, shape().ClosedU() ? 1 : 9, 9};
   after.SetOffsets({{vertex, Vec3(0, 0, 5)}});
-  const Vec2 center = ParameterOf(shape(), vertex);
+  const Vec2 center = GrevillePoint(shape(), vertex);
   const auto apart = [](double a, double b, bool closed) {
     const double straight = std::abs(a - b);
     return closed ? std::min(straight, 1 - straight) : straight;
@@ -339,7 +339,7 @@ TEST(HSpline, AnOffsetIsKeptInTheFrameOfTheCoarserSurface) {
     HSplineSurface surface = SmoothSurface(shape, 2);
     const VertexId vertex{1, 5, 6};
     const Vec3 offset(0.5, -2, 3);
-    const SurfaceFrame frame = surface.Frame(surface.ParameterOf(vertex));
+    const SurfaceFrame frame = surface.Frame(surface.GrevillePoint(vertex));
     surface.SetOffsets({{vertex, offset}});
     const Vec3 expected = reference == OffsetReference::kWorld
                               ? Vec3(frame.point + offset)
@@ -356,7 +356,7 @@ TEST(HSpline, AVertexHasItsLargestInfluenceAtItsGrevillePoint) {
     const int border_u = shape.ClosedU() ? 0 : 1, border_v = 1;
     for (int j = border_v; j < shape.Rows(1) - border_v; ++j) {
       for (int column = border_u; column < shape.Columns(1) - border_u; ++column) {
-        const Stencil stencil = StencilAt(shape, 1, ParameterOf(shape, {1, column, j}));
+        const Stencil stencil = StencilAt(shape, 1, GrevillePoint(shape, {1, column, j}));
         const int most =
             static_cast<int>(std::max_element(stencil.weight.begin(), stencil.weight.end()) -
                              stencil.weight.begin());

@@ -112,7 +112,7 @@ TEST(HSplineProject, FindsDetailOfLevelEight) {
   HSplineSurface surface = SmoothSurface({.patches_u = 4, .patches_v = 4, .max_level = 8}, 5);
   const VertexId spike{8, 402, 555};
   surface.SetOffsets({{spike, Vec3(0, 0, 4)}});
-  const Vec2 top = surface.ParameterOf(spike);
+  const Vec2 top = surface.GrevillePoint(spike);
   const Vec3 outside = surface.Point(top) + 0.01 * surface.LevelFrame(0, top).Normal();
   const SurfaceProjection found = SurfaceProjector(surface).Project(outside);
   EXPECT_TRUE(found.converged);
