@@ -10,9 +10,9 @@
 #include <memory>
 
 #include "fitting/plan/fit_result.h"
-#include "problems/pipeline/experiment_config.h"
-#include "problems/pipeline/make_face.h"
-#include "problems/prior/hspline_prior.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/experiment/make_face.h"
+#include "problems/face/hspline_prior.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
 namespace semblance {

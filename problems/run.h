@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "problems/bust/pose_bust.h"
-#include "problems/metrics/face_details.h"
-#include "problems/pipeline/case.h"
-#include "problems/pipeline/depth_comparison.h"
-#include "problems/pipeline/skull_stage.h"
-#include "problems/pipeline/uncertainty.h"
-#include "problems/prior/hspline_prior.h"
+#include "problems/face/bust/pose_bust.h"
+#include "problems/experiment/metrics/face_details.h"
+#include "problems/experiment/case.h"
+#include "problems/experiment/depth_comparison.h"
+#include "problems/experiment/skull_stage.h"
+#include "problems/experiment/uncertainty.h"
+#include "problems/face/hspline_prior.h"
 #include "surfaces/hspline_query/tessellate.h"
 
 namespace semblance {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "problems/config/config.h"
-#include "problems/plots/svg_plot.h"
+#include "problems/report/plots/svg_plot.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_picture.h"
 #include "problems/points/fit_report.h"

@@ -11,10 +11,10 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "problems/pictures/lighting.h"
-#include "problems/pictures/pictures.h"
+#include "problems/report/pictures/lighting.h"
+#include "problems/report/pictures/pictures.h"
 #include "problems/report/scene_json.h"
-#include "problems/view/view_mesh.h"
+#include "problems/report/view/view_mesh.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/pictures/colour_map.h"
+#include "problems/report/pictures/colour_map.h"
 #include "problems/points/fit_maps.h"
 
 namespace semblance {

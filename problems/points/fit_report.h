@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "fitting/nested/nested_fit.h"
-#include "problems/output/given_files.h"
-#include "problems/output/output_folder.h"
+#include "problems/io/given_files.h"
+#include "problems/io/output_folder.h"
 #include "problems/points/point_fit.h"
 #include "surfaces/base/run_context.h"
 

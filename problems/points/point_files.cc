@@ -16,7 +16,7 @@
 #include <tuple>
 #include <utility>
 
-#include "problems/output/manifest.h"
+#include "problems/io/manifest.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"

@@ -17,7 +17,7 @@
 #include "fitting/solve/attribute_fit.h"
 #include "fitting/solve/surface_sigma.h"
 #include "problems/config/config_tree.h"
-#include "problems/pipeline/step_clock.h"
+#include "problems/experiment/step_clock.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/point_table.h"
 #include "surfaces/base/fields.h"

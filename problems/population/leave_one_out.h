@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "interp/evaluation/scores.h"
-#include "problems/metrics/statistics.h"
+#include "problems/experiment/metrics/statistics.h"
 #include "problems/population/population_file.h"
 #include "problems/population/population_sample.h"
 

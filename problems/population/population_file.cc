@@ -10,8 +10,8 @@
 
 #include "problems/config/config.h"
 #include "problems/config/spelling_suggestion.h"
-#include "problems/output/file_hashes.h"
-#include "problems/output/manifest.h"
+#include "problems/io/file_hashes.h"
+#include "problems/io/manifest.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"

@@ -11,7 +11,7 @@
 
 #include "interp/evaluation/depth_truth.h"
 #include "problems/config/config_binder.h"
-#include "problems/pipeline/experiment.h"
+#include "problems/experiment/experiment.h"
 
 namespace semblance {
 

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "problems/config/config.h"
-#include "problems/output/manifest.h"
+#include "problems/io/manifest.h"
 #include "problems/population/depth_modes.h"
 #include "problems/population/population_report.h"
 #include "problems/subject/sites.h"

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/output/output_folder.h"
+#include "problems/io/output_folder.h"
 #include "problems/population/depth_modes.h"
 #include "problems/population/leave_one_out.h"
 #include "problems/population/outliers.h"

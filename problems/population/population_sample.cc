@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "problems/conditional/condition_depths.h"
+#include "problems/subject/condition_depths.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/random.h"
 

@@ -9,14 +9,14 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "problems/face_template/template_placement.h"
-#include "problems/phantom/phantom_ct.h"
-#include "problems/pipeline/case.h"
-#include "problems/propose/propose_landmarks.h"
+#include "problems/face/template_placement.h"
+#include "problems/subject/phantom_ct.h"
+#include "problems/experiment/case.h"
+#include "problems/subject/propose/propose_landmarks.h"
 #include "problems/subject/average_skull.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/sites.h"
-#include "problems/face_template/skin_distance.h"
+#include "problems/face/skin_distance.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "problems/population/population_file.h"
-#include "problems/propose/reference_head.h"
+#include "problems/subject/propose/reference_head.h"
 
 namespace semblance {
 

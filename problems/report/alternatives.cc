@@ -13,8 +13,8 @@
 #include <set>
 #include <utility>
 
-#include "problems/pictures/pictures.h"
-#include "problems/pipeline/experiment_config.h"
+#include "problems/report/pictures/pictures.h"
+#include "problems/experiment/experiment_config.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_pictures.h"
 

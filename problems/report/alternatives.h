@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "problems/config/config_tree.h"
-#include "problems/inputs/input_files.h"
-#include "problems/output/output_folder.h"
-#include "problems/pipeline/stage_cache.h"
+#include "problems/experiment/input_files.h"
+#include "problems/io/output_folder.h"
+#include "problems/experiment/stage_cache.h"
 #include "problems/run.h"
 
 namespace semblance {

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <utility>
 
-#include "problems/plots/svg_parts.h"
+#include "problems/report/plots/svg_parts.h"
 #include "problems/report/report_assets.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"

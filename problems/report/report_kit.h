@@ -10,9 +10,9 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/metrics/statistics.h"
-#include "problems/pictures/colour_map.h"
-#include "problems/plots/svg_plot.h"
+#include "problems/experiment/metrics/statistics.h"
+#include "problems/report/pictures/colour_map.h"
+#include "problems/report/plots/svg_plot.h"
 
 namespace semblance {
 

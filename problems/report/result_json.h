@@ -11,9 +11,9 @@
 #include "fitting/fit.h"
 #include "interp/evaluation/cross_validation.h"
 #include "interp/evaluation/scores.h"
-#include "problems/pipeline/depth_comparison.h"
-#include "problems/pipeline/experiment.h"
-#include "problems/pipeline/step_clock.h"
+#include "problems/experiment/depth_comparison.h"
+#include "problems/experiment/experiment.h"
+#include "problems/experiment/step_clock.h"
 #include "problems/run.h"
 
 namespace semblance {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/report/run_pictures.h"
 
-#include "problems/pictures/lighting.h"
-#include "problems/pictures/pictures.h"
-#include "problems/pictures/render.h"
+#include "problems/report/pictures/lighting.h"
+#include "problems/report/pictures/pictures.h"
+#include "problems/report/pictures/render.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 

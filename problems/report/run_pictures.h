@@ -4,10 +4,10 @@
 
 #include <vector>
 
-#include "problems/output/output_folder.h"
-#include "problems/pictures/colour_map.h"
-#include "problems/pictures/render.h"
-#include "problems/preparation/mirror.h"
+#include "problems/io/output_folder.h"
+#include "problems/report/pictures/colour_map.h"
+#include "problems/report/pictures/render.h"
+#include "problems/subject/mirror.h"
 #include "problems/run.h"
 
 namespace semblance {

@@ -2,7 +2,7 @@
 // report.html of a run, made from the files of its folder.
 #pragma once
 
-#include "problems/output/output_folder.h"
+#include "problems/io/output_folder.h"
 
 namespace semblance {
 

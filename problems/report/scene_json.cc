@@ -12,7 +12,7 @@
 
 #include "problems/report/plain_names.h"
 #include "problems/report/run_pictures.h"
-#include "problems/view/view_mesh.h"
+#include "problems/report/view/view_mesh.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "problems/face_template/template_source.h"
-#include "problems/pipeline/experiment_config.h"
+#include "problems/face/template_source.h"
+#include "problems/experiment/experiment_config.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "surfaces/base/error.h"

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "problems/metrics/identification.h"
-#include "problems/pipeline/stage_cache.h"
+#include "problems/experiment/metrics/identification.h"
+#include "problems/experiment/stage_cache.h"
 #include "problems/run.h"
 #include "problems/study/study_plan.h"
 

@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "problems/config/spelling_suggestion.h"
-#include "problems/metrics/face_region.h"
+#include "problems/experiment/metrics/face_region.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/study/depth_study.h"

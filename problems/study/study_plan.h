@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/pipeline/experiment.h"
+#include "problems/experiment/experiment.h"
 #include "problems/study/study_file.h"
 
 namespace semblance {

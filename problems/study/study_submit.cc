@@ -6,7 +6,7 @@
 #include <cstdlib>
 
 #include "problems/config/terminal_text.h"
-#include "problems/output/output_folder.h"
+#include "problems/io/output_folder.h"
 #include "surfaces/base/error.h"
 
 namespace semblance {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/metrics/statistics.h"
+#include "problems/experiment/metrics/statistics.h"
 #include "problems/study/study_metrics.h"
 #include "surfaces/base/geometry.h"
 

@@ -8,7 +8,7 @@
 #include <span>
 #include <utility>
 
-#include "problems/output/staged_folder.h"
+#include "problems/io/staged_folder.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"

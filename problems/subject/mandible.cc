@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "interp/dowels/dowel.h"
-#include "problems/pictures/mesh_primitives.h"
+#include "surfaces/mesh/mesh_primitives.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"

@@ -15,12 +15,12 @@
 #include <numbers>
 
 #include "fitting/terms/metric_distortion.h"
-#include "problems/face_template/template_source.h"
-#include "problems/inputs/input_files.h"
-#include "problems/landmark_files/read_landmarks.h"
-#include "problems/output/given_files.h"
-#include "problems/pipeline/experiment_config.h"
-#include "problems/pipeline/stage_cache.h"
+#include "problems/face/template_source.h"
+#include "problems/experiment/input_files.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/io/given_files.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/experiment/stage_cache.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"

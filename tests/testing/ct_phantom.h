@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/volumes/ct_volume.h"
+#include "problems/io/volumes/ct_volume.h"
 
 namespace semblance::testing {
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "problems/pictures/image.h"
+#include "problems/report/pictures/image.h"
 
 namespace semblance::testing {
 

@@ -7,7 +7,7 @@
 #include <regex>
 #include <string>
 
-#include "problems/study_report/study_report.h"
+#include "problems/study/report/study_report.h"
 #include "surfaces/base/atomic_file.h"
 
 namespace semblance::testing {

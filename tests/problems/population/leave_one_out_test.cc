@@ -6,7 +6,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
-#include "problems/conditional/condition_depths.h"
+#include "problems/subject/condition_depths.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/random.h"
 

@@ -12,8 +12,8 @@
 #include <utility>
 
 #include "problems/config/config.h"
-#include "problems/landmark_files/read_landmarks.h"
-#include "problems/metrics/statistics.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/experiment/metrics/statistics.h"
 #include "problems/population/population_report.h"
 #include "problems/population/population_result.h"
 #include "problems/subject/dowel_depths.h"

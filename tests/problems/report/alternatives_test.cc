@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "problems/pipeline/experiment_config.h"
+#include "problems/experiment/experiment_config.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"
 #include "surfaces/base/atomic_file.h"

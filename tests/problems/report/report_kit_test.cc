@@ -7,8 +7,8 @@
 #include <pugixml.hpp>
 #include <regex>
 
-#include "problems/pictures/image.h"
-#include "problems/plots/svg_parts.h"
+#include "problems/report/pictures/image.h"
+#include "problems/report/plots/svg_parts.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/report_assets.h"
 #include "surfaces/base/error.h"

@@ -7,8 +7,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "problems/pipeline/experiment_config.h"
-#include "problems/plots/svg_plot.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/report/plots/svg_plot.h"
 #include "problems/report/report_assets.h"
 #include "problems/report/report_kit.h"
 #include "problems/report/scene_json.h"

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "problems/view/view_mesh.h"
+#include "problems/report/view/view_mesh.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"

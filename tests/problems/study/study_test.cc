@@ -10,7 +10,7 @@
 #include "problems/run.h"
 #include "problems/study/study_metrics.h"
 #include "problems/study/study_run.h"
-#include "problems/study_report/study_report.h"
+#include "problems/study/report/study_report.h"
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"

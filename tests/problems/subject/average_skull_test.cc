@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/subject/average_skull.h"
-#include "problems/landmark_files/read_landmarks.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 
 #include <gtest/gtest.h>
 

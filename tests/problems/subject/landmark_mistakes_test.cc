@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/subject/landmark_mistakes.h"
-#include "problems/landmark_files/read_landmarks.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

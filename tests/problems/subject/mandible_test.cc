@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "problems/config/config.h"
-#include "problems/landmark_files/read_landmarks.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/landmarks.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/random.h"

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/app/evaluate.h"
+
+#include <fmt/format.h>
+
+#include <charconv>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/experiment/case.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/run.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
+#include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/mesh/mesh_check.h"
+#include "surfaces/mesh_files/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+TriMesh ReadChecked(const std::filesystem::path& path) {
+  TriMesh mesh = ReadMesh(path);
+  CheckHeadMesh(mesh, path.string());
+  return mesh;
+}
+
+TriMesh ReadFace(const std::filesystem::path& path) {
+  return path.extension() == ".json" ? Tessellate(ReadHSpline(path), kFaceQuadsPerPatch).mesh
+                                     : ReadChecked(path);
+}
+
+// A true skin, with its scored region and the basis of the scores.
+struct Truth {
+  TriMesh skin;
+  ScoredSkin scored;
+  ScoreBasis basis;
+};
+
+Truth ReadTruthOfExperiment(const EvaluateOptions& options, const RunContext& context) {
+  const auto experiment = ReadConfig<Experiment>(options.config, options.overrides);
+  CheckNetworkNamed(experiment, options.config);
+  Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment);
+  if (!options.truth.empty()) {
+    subject.skin = ReadChecked(options.truth);
+  }
+  if (!subject.skin) {
+    throw InputError(
+        fmt::format("{}: its subject has no skin to compare with; name the mesh of "
+                    "the true skin after the face",
+                    options.config.string()));
+  }
+  ScoredSkin scored = FindScoredSkin(subject, experiment.region);
+  return {std::move(*subject.skin), std::move(scored), std::move(subject.basis)};
+}
+
+std::vector<Dowel> MakeDowels(const LandmarkFile& file) {
+  std::vector<Dowel> dowels;
+  for (const Landmark& landmark : file.landmarks) {
+    const auto& p = landmark.point;
+    const auto& n = landmark.normal;
+    dowels.push_back({.site = landmark.site,
+                      .base = {p[0], p[1], p[2]},
+                      .direction = n ? Vec3(Vec3((*n)[0], (*n)[1], (*n)[2]).normalized())
+                                     : Vec3::Constant(kNaN)});
+  }
+  return dowels;
+}
+
+Truth ReadTruthFiles(const EvaluateOptions& options) {
+  if (options.truth.empty()) {
+    throw InputError(
+        "evaluate: there is nothing to compare the face with; name the mesh of the true skin after "
+        "the face, or an experiment with --config");
+  }
+  if (!options.overrides.empty()) {
+    throw InputError("evaluate: --set changes a configuration; name it with --config");
+  }
+  Truth truth{.skin = ReadChecked(options.truth), .scored = {}, .basis = {}};
+  if (options.landmarks.empty()) {
+    if (!options.exclude.empty()) {
+      throw InputError("evaluate: --exclude names sites; give the landmarks with --landmarks");
+    }
+    truth.scored = AllScored(truth.skin);
+    return truth;
+  }
+  truth.basis = MakeScoreBasis(MakeDowels(ReadLandmarks(options.landmarks).file));
+  if (!truth.basis.sites) {
+    throw InputError(fmt::format("{}: fewer than three landmarks do not locate the face; add some",
+                                 options.landmarks.string()));
+  }
+  truth.scored =
+      FindScoredSkin(truth.skin, *truth.basis.sites, {}, {}, {.exclude = options.exclude});
+  return truth;
+}
+
+}  // namespace
+
+nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext& context) {
+  if (!options.config.empty() && !(options.landmarks.empty() && options.exclude.empty())) {
+    throw InputError(
+        "evaluate: the configuration names landmarks and zones; leave --landmarks and --exclude "
+        "out, or change it with --set");
+  }
+  const TriMesh face = ReadFace(options.face);
+  const Truth truth =
+      options.config.empty() ? ReadTruthFiles(options) : ReadTruthOfExperiment(options, context);
+  return ScoreToJson(CompareFaces(truth.skin, truth.scored.region, face, context),
+                     MeasureDetails(truth.skin, truth.scored, truth.basis, face, context),
+                     truth.scored);
+}
+
+ExcludedZone ParseZone(const std::string& text) {
+  const std::size_t equals = std::min(text.find('='), text.size());
+  const std::string radius = text.substr(std::min(equals + 1, text.size()));
+  ExcludedZone zone{.site = text.substr(0, equals)};
+  const char* const end = radius.data() + radius.size();
+  const auto [rest, fault] = std::from_chars(radius.data(), end, zone.radius_mm);
+  if (fault != std::errc() || rest != end || !(zone.radius_mm > 0 && zone.radius_mm <= 200)) {
+    throw InputError(
+        fmt::format("--exclude {}: write a site and a radius of 0 to 200 mm, e.g. zy_r=15", text));
+  }
+  if (const std::string complaint = StandardSiteFault(zone.site); !complaint.empty()) {
+    throw InputError(fmt::format("--exclude {}: {}", text, complaint));
+  }
+  return zone;
+}
+
+}  // namespace semblance

@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/app/all_commands.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "problems/app/exit_code.h"
+#include "problems/app/progress.h"
+#include "problems/config/terminal_text.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/report/site_page.h"
+#include "problems/report/pictures/site_picture.h"
+#include "problems/io/given_files.h"
+#include "problems/app/work_options.h"
+#include "problems/subject/propose/propose_landmarks.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/mesh_files/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The arguments of `landmarks convert` and `landmarks page`.
+struct LandmarkArguments {
+  std::string in, out;
+  std::vector<std::string> tables;
+  ReadLandmarksOptions reading;
+  bool force = false;
+};
+
+void PrintEach(const std::vector<std::string>& lines, const char* what) {
+  for (const std::string& line : lines) {
+    fmt::print(stderr, "{}", ForTerminal(fmt::format("{}: {}\n", what, line)));
+  }
+}
+
+int Convert(const LandmarkArguments& a) {
+  RefuseToReplace(a.out, std::array<fs::path, 1>{a.in});
+  RefuseExisting(a.out, a.force);
+  const LandmarkReading reading = ReadLandmarks(a.in, a.reading);
+  const std::string bytes = EncodeLandmarks(reading.file, a.out);
+  PrintEach(reading.notes, "note");
+  PrintEach(LostContents(reading.file, a.out), "not kept in this kind of file");
+  WriteFileAtomically(a.out, bytes);
+  fmt::print("{}: {} landmarks, mm, LPS\n", a.out, reading.file.landmarks.size());
+  return kDone;
+}
+
+int Page(const LandmarkArguments& a) {
+  std::vector<TissueTable> tables;
+  for (const std::string& table : a.tables) {
+    tables.push_back(ReadTissueTable(table));
+  }
+  const fs::path page = fs::path(a.out) / "sites.md", picture = fs::path(a.out) / "sites.svg";
+  if (!a.force && (fs::exists(page) || fs::exists(picture))) {
+    throw IoError(
+        fmt::format("{}: sites.md or sites.svg exists; add --force to replace it", a.out));
+  }
+  fs::create_directories(a.out);
+  WriteFileAtomically(page, SitePage(tables, picture.filename().string()));
+  WriteFileAtomically(picture, SitePictureSvg(/*threads=*/1));
+  fmt::print("{}\n", page.string());
+  return kDone;
+}
+
+void DeclarePage(CLI::App& page, CommandLine& line) {
+  LandmarkArguments& a = *Bind(page, line, &Page);
+  page.add_option("TABLES", a.tables, "tissue tables whose sites the page marks")->required();
+  page.add_option("--out", a.out, "folder for sites.md and sites.svg")->required();
+  page.add_flag("--force", a.force, "replace existing files");
+}
+
+void DeclareConvert(CLI::App& convert, CommandLine& line) {
+  LandmarkArguments& a = *Bind(convert, line, &Convert);
+  convert.add_option("IN", a.in, ".yaml, .mrk.json, .fcsv, .pp, .csv, .txt or .asc")->required();
+  convert.add_option("OUT", a.out, "file of one of these kinds")->required();
+  AddChoice(convert, "--axes",
+            "LPS or RAS: axes of a file that does not state them (.pp, .csv, .txt, .asc) [LPS]",
+            a.reading.axes);
+  convert.add_flag("--leave-out-unknown", a.reading.leave_out_unknown,
+                   "leave out points whose name is not a site, and list them");
+  convert.add_flag("--force", a.force, "replace a file of the same name");
+}
+
+// The arguments of `landmarks propose`.
+struct ProposeArguments {
+  std::string skull, out, compare;
+  std::vector<std::pair<std::string, std::string>> references;  // skull, landmarks
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  bool force = false, quiet = false;
+  std::stop_token stop;
+};
+
+// Without a given reference the references are two phantoms.
+std::vector<ReferenceHead> ReadReferences(const ProposeArguments& a) {
+  std::vector<ReferenceHead> heads;
+  for (const auto& [skull, landmarks] : a.references) {
+    heads.push_back(ReadReference(skull, landmarks, a.threads));
+  }
+  if (heads.empty()) {
+    heads.push_back(PhantomReference(1));
+    heads.push_back(PhantomReference(2));
+    fmt::print(
+        stderr,
+        "note: without --reference the references are phantoms, which have no orbits, arches or "
+        "teeth; a real skull with landmarks as --reference gives a much better proposal\n");
+  }
+  return heads;
+}
+
+void PrintDifferences(const ProposeArguments& a, const LandmarkFile& file) {
+  fmt::print("{}", FormatComparison(CompareProposal(InLpsMm(file), ReadLandmarks(a.compare).file)));
+}
+
+void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {
+  const std::string bytes = EncodeLandmarks(file, out);
+  PrintEach(LostContents(file, out), "not kept in this kind of file");
+  if (const fs::path folder = fs::path(out).parent_path(); !folder.empty()) {
+    fs::create_directories(folder);
+  }
+  RefuseExisting(out, a.force);
+  WriteFileAtomically(out, bytes);
+  fmt::print(
+      "{}: {} sites proposed, {} absent, mm, {}. Check each on the skull and correct it; then "
+      "set `proposed: false`\n",
+      out, file.landmarks.size(), file.absent.size(), WrittenAxes(file, out));
+}
+
+std::vector<fs::path> InputsOfProposal(const ProposeArguments& a) {
+  std::vector<fs::path> given = {a.skull, a.compare};
+  for (const auto& [skull, landmarks] : a.references) {
+    given.insert(given.end(), {skull, landmarks});
+  }
+  return given;
+}
+
+int Propose(const ProposeArguments& a) {
+  const std::string out =
+      a.out.empty() ? fmt::format("out/{}_proposed.yaml", fs::path(a.skull).stem().string())
+                    : a.out;
+  const bool writes = a.compare.empty() || !a.out.empty();
+  if (writes) {
+    RefuseToReplace(out, InputsOfProposal(a));
+    RefuseExisting(out, a.force);
+  }
+  RunContext context{.on_event = {}, .stop_token = a.stop, .threads = a.threads};
+  if (!a.quiet) {
+    context.on_event = ProgressPrinter(stderr);
+  }
+  const Proposal proposal =
+      ProposeLandmarks(ReadMesh(a.skull), a.skull, ReadReferences(a), context);
+  PrintEach(proposal.notes, "note");
+  const LandmarkFile file = ProposalFile(proposal, fs::path(a.skull).stem().string());
+  if (!a.compare.empty()) {
+    PrintDifferences(a, file);
+  }
+  if (writes) {
+    WriteProposal(a, out, file);
+  }
+  return kDone;
+}
+
+void DeclarePropose(CLI::App& propose, CommandLine& line) {
+  ProposeArguments& a = *Bind(propose, line, &Propose);
+  a.stop = line.stop;
+  propose.add_option("SKULL", a.skull, "skull (.ply .obj .stl .off), mm, in any pose")->required();
+  propose.add_option(
+      "--reference", a.references,
+      "SKULL LANDMARKS: a skull with known landmarks, mm; may be repeated, and the median "
+      "is used [two phantoms]");
+  propose.add_option("--out", a.out, "file for the proposal [out/SKULL_proposed.yaml]");
+  propose.add_option(
+      "--compare", a.compare,
+      "landmarks placed by hand: prints the error of each site; writes no file unless "
+      "--out is given");
+  propose.add_flag("--force", a.force, "replace a file of the same name");
+  propose.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  propose.add_flag("--quiet", a.quiet, "no progress");
+}
+
+constexpr std::array kLandmarkCommands = {
+    ProgramCommand{"convert", "convert landmarks from one program to another", &DeclareConvert},
+    ProgramCommand{"page", "write a page of all sites: names, definition, tables, picture",
+                   &DeclarePage},
+    ProgramCommand{"propose", "propose the landmarks of a skull in a file to correct",
+                   &DeclarePropose},
+};
+
+void DeclareLandmarks(CLI::App& landmarks, CommandLine& line) {
+  landmarks.require_subcommand(1);
+  Declare(kLandmarkCommands, landmarks, line);
+}
+
+}  // namespace
+
+std::span<const ProgramCommand> LandmarkCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"landmarks", "convert, propose and document landmarks on a skull",
+                     &DeclareLandmarks},
+  };
+  return kCommands;
+}
+
+}  // namespace semblance

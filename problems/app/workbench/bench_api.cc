@@ -1,0 +1,477 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/app/workbench/bench_api.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <new>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "problems/config/config.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/report/pictures/site_picture.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/report/report_assets.h"
+#include "problems/app/workbench/bench_json.h"
+#include "problems/app/workbench/bench_actions.h"
+#include "problems/app/workbench/bench_assets.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/json_text.h"
+#include "surfaces/hspline_files/face_export.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kJson = "application/json";
+
+BenchReply JsonReply(std::string body) { return {200, kJson, std::move(body), {}}; }
+
+// Cuts the message, because it may quote a request of any length.
+BenchReply MessageReply(int status, const char* key, const std::string& message) {
+  constexpr std::size_t kMaxMessage_bytes = 2000;
+  return {status,
+          kJson,
+          Json{{key, message.substr(0, kMaxMessage_bytes)}}.dump(-1, ' ', false,
+                                                                 Json::error_handler_t::replace),
+          {}};
+}
+
+// The reply to a request that the page never makes.
+BenchReply ErrorReply(int status, const std::string& message) {
+  return MessageReply(status, "error", message);
+}
+
+// The reply to a person's action that is impossible. Its status is 200, because a browser lists
+// each status from 400 on as a fault of the page.
+BenchReply RefusalReply(const std::string& message) {
+  return MessageReply(200, "refused", message);
+}
+
+class BadRequest : public std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+Json ParseBody(const BenchRequest& request) {
+  try {
+    return ParseJson(request.body, "the request");
+  } catch (const IoError& error) {
+    throw BadRequest(error.what());
+  }
+}
+
+BenchReply StateReply(const Bench& bench) {
+  return JsonReply(SnapshotJson(bench.TakeSnapshot(), bench.Folder()));
+}
+
+// ---------------------------------------------------------------------------------------------
+// The page and its files
+// ---------------------------------------------------------------------------------------------
+
+const char* ContentType(const std::string& name) {
+  constexpr std::array<std::pair<const char*, const char*>, 7> kTypes = {
+      {{".html", "text/html; charset=utf-8"},
+       {".css", "text/css; charset=utf-8"},
+       {".js", "text/javascript; charset=utf-8"},
+       {".json", kJson},
+       {".png", "image/png"},
+       {".svg", "image/svg+xml"},
+       {".yaml", "text/plain; charset=utf-8"}}};
+  const std::string extension = fs::path(name).extension().string();
+  const auto* const found =
+      std::ranges::find_if(kTypes, [&](const auto& type) { return extension == type.first; });
+  return found == kTypes.end() ? "application/octet-stream" : found->second;
+}
+
+// Serves only files that are part of the program. No name leads to the disk.
+BenchReply PageFile(const std::string& path) {
+  const std::string name = path.empty() ? "index.html" : path;
+  if (name == "three.js") {
+    return {200, ContentType(name), std::string(ThreeScript()), {}};
+  }
+  if (name == "report.css") {
+    return {200, ContentType(name), std::string(ReportStyle()), {}};
+  }
+  if (name == "view.js") {
+    return {200, ContentType(name), std::string(ReportPartsScript()), {}};
+  }
+  for (const BenchAsset& file : PageFiles()) {
+    if (file.name == name) {
+      return {200, ContentType(name), std::string(file.text), {}};
+    }
+  }
+  return ErrorReply(404, fmt::format("the page has no file '{}'", name));
+}
+
+// Serves a file of the last run, never one outside run/.
+BenchReply RunFile(const Bench& bench, const std::string& name) {
+  const fs::path root = bench.Folder() / "run";
+  std::error_code error;
+  const fs::path path = fs::canonical(root / name, error);
+  const fs::path inside = error ? fs::path() : path.lexically_relative(fs::canonical(root));
+  const bool is_inside = !inside.empty() && inside.begin()->string() != "..";
+  if (error || !is_inside || !fs::is_regular_file(path)) {
+    return ErrorReply(404, fmt::format("the last run has no file '{}'", name));
+  }
+  return {200, ContentType(name), ReadFileBytes(path), {}};
+}
+
+// ---------------------------------------------------------------------------------------------
+// Requests that change nothing
+// ---------------------------------------------------------------------------------------------
+
+BenchReply Meshes(Bench& bench, const BenchRequest&) {
+  return JsonReply(MeshesJson(*bench.TakeSnapshot().subject));
+}
+
+BenchReply Sites(Bench&, const BenchRequest&) { return JsonReply(SitesJson()); }
+
+BenchReply SitesPicture(Bench&, const BenchRequest&) {
+  static const std::string kPicture = SitePictureSvg(/*threads=*/1);
+  return {200, "image/svg+xml", kPicture, {}};
+}
+
+std::string QueryText(const BenchRequest& request, const char* key) {
+  const auto at = request.query.find(key);
+  return at == request.query.end() ? std::string() : at->second;
+}
+
+// Picture of the place of one site, for ?site=CODE.
+BenchReply SitePictureReply(Bench&, const BenchRequest& request) {
+  static const SiteSketch kSketch = MakeSiteSketch(/*threads=*/1);
+  return {200, "image/png", EncodePng(DrawSitePicture(kSketch, QueryText(request, "site"))), {}};
+}
+
+BenchReply Schema(Bench&, const BenchRequest&) { return JsonReply(OptionsSchema<Experiment>()); }
+
+// The files of the folder that options may name, the parts of the template and the kept features.
+BenchReply Files(Bench& bench, const BenchRequest&) {
+  Json json = {{"tables", Json::array()}, {"networks", Json::array()}};
+  for (const auto& [kind, list] : json.items()) {
+    const fs::path folder = bench.Folder() / kind;
+    std::vector<std::string> names;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      names.push_back(fs::path(kind) / entry.path().filename());
+    }
+    std::ranges::sort(names);
+    for (const std::string& name : names) {
+      const fs::path path = bench.Folder() / name;
+      json[kind].push_back({{"path", path.string()},
+                            {"title", kind == "tables" ? ReadTissueTable(path).title : name}});
+    }
+  }
+  json["parts"] = bench.PartsOfFace();
+  json["features"] = bench.KeptFeatures();
+  return JsonReply(json.dump());
+}
+
+BenchReply FaceReply(const BenchFace& face) { return JsonReply(FaceJson(face)); }
+
+BenchVariant RequestedVariant(const BenchRequest& request) {
+  const auto name = request.query.find("variant");
+  return name == request.query.end() ? BenchVariant::kAsIs : FindVariant(name->second);
+}
+
+BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
+  const auto path = request.query.find("path"), value = request.query.find("value");
+  if (path != request.query.end() && value != request.query.end()) {
+    return FaceReply(bench.CoarseWith({path->second, value->second}));
+  }
+  return FaceReply(bench.Coarse(RequestedVariant(request)));
+}
+
+BenchReply VariantReply(Bench& bench, const BenchRequest& request) {
+  return FaceReply(bench.FullVariant(RequestedVariant(request)));
+}
+
+BenchReply FullReply(Bench& bench, const BenchRequest&) { return FaceReply(bench.Full()); }
+
+BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
+  const auto format = request.query.find("format");
+  const std::string name =
+      "landmarks" + (format == request.query.end() ? std::string(".yaml") : format->second);
+  const LandmarkFile file = ToLandmarkFile(CurrentState(bench.TakeSnapshot().history));
+  return {200, "application/octet-stream", EncodeLandmarks(file, name), name};
+}
+
+// Exports the face of the last run with its edits, or the face of a variant.
+BenchReply FaceFile(Bench& bench, const BenchRequest& request) {
+  const auto format = request.query.find("format");
+  const std::string extension = format == request.query.end() ? ".ply" : format->second;
+  const bool is_variant = request.query.contains("variant");
+  const BenchFace face = is_variant ? bench.FullVariant(RequestedVariant(request)) : bench.Full();
+  const std::string name =
+      is_variant ? std::string(VariantName(RequestedVariant(request))) : std::string("face");
+  return {200, "application/octet-stream",
+          EncodeFace(face.surface, extension, /*chord_mm=*/std::nullopt, /*threads=*/1),
+          name + extension};
+}
+
+// ---------------------------------------------------------------------------------------------
+// Actions
+// ---------------------------------------------------------------------------------------------
+
+Vec3 ReadVector(const Json& json, const char* key) {
+  const auto numbers = json.at(key).get<std::array<double, 3>>();
+  return {numbers[0], numbers[1], numbers[2]};
+}
+
+std::string ReadText(const Json& json, const char* key) { return json.at(key).get<std::string>(); }
+
+template <class Enum>
+Enum ReadEnum(const Json& json, const char* key) {
+  constexpr auto kNames = EnumNames(Enum{});
+  const auto* const name = std::ranges::find(kNames, ReadText(json, key));
+  if (name == kNames.end()) {
+    throw InputError(fmt::format("{}: '{}' is unknown; give one of {}", key, ReadText(json, key),
+                                 fmt::join(kNames, ", ")));
+  }
+  return static_cast<Enum>(name - kNames.begin());
+}
+
+LandmarkRemarks ReadRemarks(const Json& json) {
+  LandmarkRemarks remarks{.certainty = ReadEnum<Certainty>(json, "certainty"),
+                          .note = ReadText(json, "note")};
+  if (!json.at("depth_mm").is_null()) {
+    remarks.depth_along_normal_mm = json.at("depth_mm").get<double>();
+  }
+  return remarks;
+}
+
+using Action = void (*)(Bench&, const Json&);
+
+void Place(Bench& bench, const Json& json) {
+  bench.PlaceByRay(ReadText(json, "site"), ReadVector(json, "origin"),
+                   ReadVector(json, "direction"), ReadVector(json, "near"));
+}
+void Remove(Bench& bench, const Json& json) {
+  const std::string site = ReadText(json, "site");
+  bench.Apply("removed " + site, [&](BenchState s) { return RemoveLandmark(std::move(s), site); });
+}
+void Rename(Bench& bench, const Json& json) {
+  const std::string site = ReadText(json, "site"), name = ReadText(json, "name");
+  bench.Apply(fmt::format("renamed {} to {}", site, name),
+              [&](BenchState s) { return RenameLandmark(std::move(s), site, name); });
+}
+void Absent(Bench& bench, const Json& json) {
+  const std::string site = ReadText(json, "site");
+  bench.Apply("marked " + site + " absent", [&](BenchState s) {
+    return MarkAbsent(std::move(s), site, ReadText(json, "reason"));
+  });
+}
+void Remark(Bench& bench, const Json& json) {
+  const std::string site = ReadText(json, "site");
+  bench.Apply("remarked on " + site,
+              [&](BenchState s) { return RemarkLandmark(std::move(s), site, ReadRemarks(json)); });
+}
+void Confirm(Bench& bench, const Json& json) {
+  const std::string site = ReadText(json, "site");
+  bench.Apply("confirmed " + site,
+              [&](BenchState s) { return ConfirmLandmark(std::move(s), site); });
+}
+void ConfirmAll(Bench& bench, const Json&) {
+  bench.Apply("confirmed all", [](BenchState s) { return ConfirmAllLandmarks(std::move(s)); });
+}
+void ClearLandmarks(Bench& bench, const Json&) {
+  bench.Apply("removed all landmarks",
+              [](BenchState s) { return ReplaceLandmarks(std::move(s), {}); });
+}
+void Predicted(Bench& bench, const Json&) { bench.AcceptPredicted(); }
+void Set(Bench& bench, const Json& json) {
+  const std::string path = ReadText(json, "path");
+  if (path == "subject.axes" || path == "subject.units") {
+    bench.CorrectFrame(path, json.at("value").dump());
+    return;
+  }
+  bench.Apply("set " + path, [&](BenchState s) {
+    return ChangeSetting(std::move(s), path, json.at("value").dump());
+  });
+}
+void Unset(Bench& bench, const Json& json) {
+  const std::string path = ReadText(json, "path");
+  bench.Apply("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
+}
+Pull ReadPull(const Json& json) {
+  return {.level = json_parts::IntFromJson(json.at("level")),
+          .reach = json.at("reach").get<double>(),
+          .mirror = json.at("mirror").get<bool>()};
+}
+void PullFace(Bench& bench, const Json& json) {
+  Pull pull = ReadPull(json);
+  pull.by_mm = ReadVector(json, "by");
+  bench.PullAt(ReadVector(json, "at"), pull);
+}
+void ClearEdits(Bench& bench, const Json&) {
+  bench.Apply("removed all edits", [](BenchState s) { return ReplaceEdits(std::move(s), {}); });
+}
+void Keep(Bench& bench, const Json& json) {
+  bench.KeepFeature(ReadText(json, "part"), ReadText(json, "name"));
+}
+void Blend(Bench& bench, const Json& json) {
+  bench.BlendFeature(ReadText(json, "name"), json.at("weight").get<double>());
+}
+// Empty if the key is missing.
+std::string ReadOptionalText(const Json& json, const char* key) {
+  return json.contains(key) && json.at(key).is_string() ? ReadText(json, key) : "";
+}
+void OpenFile(Bench& bench, const Json& json) {
+  OpenRequest request{
+      .path = ReadText(json, "path"), .as = ReadEnum<OpenAs>(json, "as"), .volume = {}, .axes = {}};
+  if (json.contains("volume")) {
+    request.volume = ReadConfigText<CtSubject>(json.at("volume").dump(), "volume");
+  }
+  if (!ReadOptionalText(json, "axes").empty()) {
+    request.axes = ReadEnum<Axes>(json, "axes");
+  }
+  bench.StartOpening(request);
+}
+void Forget(Bench& bench, const Json& json) {
+  DropIncoming(bench.Folder(), ReadText(json, "batch"));
+}
+void MakeVariants(Bench& bench, const Json& json) {
+  std::vector<BenchVariant> variants;
+  for (const Json& name : json.at("variants")) {
+    variants.push_back(FindVariant(name.get<std::string>()));
+  }
+  bench.StartVariants(variants);
+}
+void UndoStep(Bench& bench, const Json&) { bench.Undo(); }
+void RedoStep(Bench& bench, const Json&) { bench.Redo(); }
+void RunFace(Bench& bench, const Json&) { bench.StartRun(); }
+void ProposeSites(Bench& bench, const Json&) { bench.StartProposal(); }
+void Cancel(Bench& bench, const Json&) { bench.CancelJob(); }
+
+constexpr std::array<std::pair<std::string_view, Action>, 23> kActions = {
+    {{"place", &Place},
+     {"remove", &Remove},
+     {"rename", &Rename},
+     {"absent", &Absent},
+     {"remark", &Remark},
+     {"confirm", &Confirm},
+     {"confirm_all", &ConfirmAll},
+     {"clear_landmarks", &ClearLandmarks},
+     {"take_predicted", &Predicted},
+     {"set", &Set},
+     {"unset", &Unset},
+     {"open", &OpenFile},
+     {"forget", &Forget},
+     {"pull", &PullFace},
+     {"clear_edits", &ClearEdits},
+     {"keep_feature", &Keep},
+     {"blend_feature", &Blend},
+     {"undo", &UndoStep},
+     {"redo", &RedoStep},
+     {"run", &RunFace},
+     {"propose", &ProposeSites},
+     {"variants", &MakeVariants},
+     {"cancel", &Cancel}}};
+
+BenchReply Act(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseBody(request);
+  const std::string name = ReadText(json, "do");
+  const auto* const found =
+      std::ranges::find(kActions, name, &decltype(kActions)::value_type::first);
+  if (found == kActions.end()) {
+    return ErrorReply(400, fmt::format("unknown action '{}'", name));
+  }
+  found->second(bench, json);
+  return StateReply(bench);
+}
+
+// Stores a file from the browser until it is opened.
+BenchReply Upload(Bench& bench, const BenchRequest& request) {
+  const fs::path path = SaveIncoming(bench.Folder(), QueryText(request, "batch"),
+                                     QueryText(request, "name"), request.body);
+  return JsonReply(Json{{"path", path.string()}}.dump());
+}
+
+// Identifies a path on this machine or the files of an uploaded batch.
+BenchReply Identify(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseBody(request);
+  const std::string batch = ReadOptionalText(json, "batch");
+  const fs::path path =
+      batch.empty() ? fs::path(ReadText(json, "path")) : IncomingBatch(bench.Folder(), batch);
+  return JsonReply(ImportedFileJson(IdentifyImport(path)));
+}
+
+// The displacements of the shown vertices, for the preview of a pull.
+BenchReply PullPreview(Bench& bench, const BenchRequest& request) {
+  const Json json = ParseBody(request);
+  return JsonReply(PullMovesJson(bench.PullMovesAt(ReadVector(json, "at"), ReadPull(json))));
+}
+
+BenchReply State(Bench& bench, const BenchRequest&) { return StateReply(bench); }
+
+using Handler = BenchReply (*)(Bench&, const BenchRequest&);
+struct Route {
+  std::string_view method, path;
+  Handler handle;
+};
+
+constexpr std::array kRoutes = {
+    Route{"GET", "api/state", &State},
+    Route{"GET", "api/schema", &Schema},
+    Route{"GET", "api/sites", &Sites},
+    Route{"GET", "api/sites.svg", &SitesPicture},
+    Route{"GET", "api/site.png", &SitePictureReply},
+    Route{"GET", "api/files", &Files},
+    Route{"GET", "api/meshes", &Meshes},
+    Route{"GET", "api/coarse", &CoarseReply},
+    Route{"GET", "api/face", &FullReply},
+    Route{"GET", "api/variant", &VariantReply},
+    Route{"GET", "api/landmarks", &LandmarksFile},
+    Route{"GET", "api/export", &FaceFile},
+    Route{"POST", "api/act", &Act},
+    Route{"POST", "api/look", &Identify},
+    Route{"POST", "api/pull", &PullPreview},
+    Route{"POST", "api/upload", &Upload},
+};
+
+BenchReply Find(Bench& bench, const BenchRequest& request) {
+  for (const Route& route : kRoutes) {
+    if (route.path == request.path) {
+      return route.method == request.method
+                 ? route.handle(bench, request)
+                 : ErrorReply(405, fmt::format("{} takes {}", route.path, route.method));
+    }
+  }
+  if (request.method != "GET") {
+    return ErrorReply(404, "no address here takes POST");
+  }
+  constexpr std::string_view kRun = "run/";
+  return request.path.starts_with(kRun) ? RunFile(bench, request.path.substr(kRun.size()))
+                                        : PageFile(request.path);
+}
+
+}  // namespace
+
+BenchReply Answer(Bench& bench, const BenchRequest& request) {
+  try {
+    return Find(bench, request);
+  } catch (const Error& error) {
+    return RefusalReply(error.what());
+  } catch (const BadRequest& error) {
+    return ErrorReply(400, error.what());
+  } catch (const nlohmann::json::exception& error) {
+    return ErrorReply(400, fmt::format("the request is not valid: {}", JsonFault(error)));
+  } catch (const Cancelled&) {
+    return RefusalReply("stopped");
+  } catch (const std::bad_alloc&) {
+    return ErrorReply(507, "not enough memory");
+  } catch (const fs::filesystem_error& error) {
+    return RefusalReply(fmt::format("a file cannot be used: {}", error.code().message()));
+  } catch (const std::exception& error) {
+    return ErrorReply(500, fmt::format("the work failed: {}", error.what()));
+  }
+}
+
+}  // namespace semblance

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/app/workbench/bench_checks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "problems/subject/mirror.h"
+#include "problems/subject/average_skull.h"
+#include "problems/subject/landmark_mistakes.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+Vec3 ToVec3(const Landmark& l) { return {l.point[0], l.point[1], l.point[2]}; }
+
+std::vector<SitePoint> StandardSites(const LandmarkFile& file) {
+  std::vector<SitePoint> sites;
+  for (const Landmark& l : file.landmarks) {
+    if (IsStandardSite(l.site)) {
+      sites.push_back({l.site, ToVec3(l)});
+    }
+  }
+  return sites;
+}
+
+// Return none if there are too few sites or all lie on a line.
+std::optional<SkullFit> TryFitAverageSkull(std::span<const SitePoint> sites) {
+  try {
+    return FitAverageSkull(sites);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<MidPlane> TryFitMidPlane(std::span<const SitePoint> sites) {
+  try {
+    return FitMidPlane(sites);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
+}
+
+void MeasureMirrors(std::span<const SitePoint> sites, const MidPlane& plane,
+                    LandmarkChecks& checks) {
+  for (const SitePoint& site : sites) {
+    const auto partner = std::ranges::find(sites, MirrorOf(site.site), &SitePoint::site);
+    if (partner != sites.end()) {
+      const double apart = (plane.Mirrored(partner->point) - site.point).norm();
+      checks.sites[site.site].from_mirror_mm = partner->site == site.site ? apart / 2 : apart;
+    }
+  }
+}
+
+void Predict(const SkullFit& fit, std::span<const SitePoint> sites, const MeshQuery& bone,
+             LandmarkChecks& checks) {
+  // Farther predictions lie beside missing or broken bone.
+  constexpr double kFarthest_mm = 15;
+  for (std::size_t k = 0; k < sites.size(); ++k) {
+    checks.sites[sites[k].site].from_predicted_mm = fit.residual_mm[k];
+  }
+  for (const std::string& site : StandardSiteCodes()) {
+    if (checks.sites.contains(site)) {
+      continue;
+    }
+    const MeshPoint at = bone.Closest(fit.Predicted(site));
+    if (at.distance_mm <= kFarthest_mm) {
+      checks.predicted[site] = at.position;
+    }
+  }
+}
+
+}  // namespace
+
+LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, const MeshQuery& bone,
+                              const PlaceOptions& options) {
+  LandmarkChecks checks;
+  for (const Landmark& l : file.landmarks) {
+    checks.sites[l.site].from_bone_mm = bone.Closest(ToVec3(l)).distance_mm;
+  }
+  const std::vector<SitePoint> sites = StandardSites(file);
+  if (const auto fit = TryFitAverageSkull(sites)) {
+    Predict(*fit, sites, bone, checks);
+  }
+  if (const auto plane = TryFitMidPlane(sites)) {
+    MeasureMirrors(sites, *plane, checks);
+  }
+  if (!file.landmarks.empty()) {
+    LandmarkMistakes found = FindLandmarkMistakes(file, skull, bone, options);
+    checks.errors = std::move(found.errors);
+    checks.notes = std::move(found.notes);
+  }
+  return checks;
+}
+
+LandmarkFile PredictedLandmarks(const LandmarkChecks& checks) {
+  LandmarkFile file;
+  file.proposed = true;
+  for (const auto& [site, point] : checks.predicted) {
+    Landmark landmark;
+    landmark.site = site;
+    landmark.point = {point.x(), point.y(), point.z()};
+    landmark.certainty = Certainty::kLow;
+    landmark.note = "predicted from the other landmarks and an average skull";
+    file.landmarks.push_back(std::move(landmark));
+  }
+  return file;
+}
+
+}  // namespace semblance

@@ -1,0 +1,196 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/app/workbench/bench_subject.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <initializer_list>
+
+#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/io/output_folder.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/subject/phantom.h"
+#include "problems/report/view/view_mesh.h"
+#include "problems/io/volumes/read_volume.h"
+#include "problems/app/workbench/bench_actions.h"
+#include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/lower_case.h"
+#include "surfaces/mesh/mesh_check.h"
+#include "surfaces/mesh_files/mesh_io.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Of the shown skull. Landmarks are clicked on it: fewer triangles move them off the true bone,
+// more make the page slow.
+constexpr int kSkullTriangles = 60000;
+
+TriMesh ReadInMm(const fs::path& path, const FileSubject& files) {
+  TriMesh mesh = ReadMesh(path);
+  for (Vec3& p : mesh.points) {
+    p = ToLpsMm(p, files.axes, files.units);
+  }
+  return mesh;
+}
+
+void AppendMesh(const TriMesh& more, TriMesh& mesh) {
+  const auto first = static_cast<std::int32_t>(mesh.points.size());
+  mesh.points.insert(mesh.points.end(), more.points.begin(), more.points.end());
+  for (const Triangle& t : more.triangles) {
+    mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  }
+}
+
+// Adds faults of the mesh to the subject instead of throwing, so that the page can show the mesh.
+void CheckMesh(const TriMesh& mesh, const fs::path& path, BenchSubject& subject) {
+  try {
+    std::ranges::move(CheckHeadMesh(mesh, path.filename().string()),
+                      std::back_inserter(subject.notes));
+  } catch (const InputError& error) {
+    subject.faults.emplace_back(error.what());
+  }
+}
+
+void AddLandmarks(const fs::path& path, BenchState& state) {
+  if (!path.empty()) {
+    state = ReplaceLandmarks(std::move(state), ReadLandmarks(path).file);
+  }
+}
+
+FileSubject WriteMeshes(const TriMesh& skull, const TriMesh& skin, const fs::path& folder) {
+  FileSubject files;
+  files.skull = folder / "skull.ply";
+  files.skin = folder / "skin.ply";
+  fs::create_directories(folder);
+  WriteFileAtomically(files.skull, EncodeMesh(skull, ".ply"));
+  WriteFileAtomically(files.skin, EncodeMesh(skin, ".ply"));
+  return files;
+}
+
+FileSubject ToFiles(const FileSubject& subject, const fs::path&, BenchState& state,
+                    const RunContext&, std::vector<std::string>&) {
+  AddLandmarks(subject.landmarks, state);
+  FileSubject files = subject;
+  files.landmarks.clear();
+  return files;
+}
+
+FileSubject ToFiles(const PhantomOptions& subject, const fs::path& meshes, BenchState& state,
+                    const RunContext&, std::vector<std::string>&) {
+  const Phantom phantom = MakePhantom(subject);
+  state = ReplaceLandmarks(std::move(state), PhantomLandmarks(phantom, subject.random_seed));
+  return WriteMeshes(phantom.skull, phantom.face, meshes);
+}
+
+FileSubject ToFiles(const CtSubject& subject, const fs::path& meshes, BenchState& state,
+                    const RunContext& context, std::vector<std::string>& notes) {
+  const VolumeReading reading = ReadVolume(subject.volume, subject.read, context);
+  if (reading.modality == Modality::kMr) {
+    throw InputError(fmt::format(
+        "{}: an MR shows no bone, and the workbench needs a skull; give a CT or a mesh of "
+        "the skull first, and open the MR as its skin afterwards",
+        subject.volume.string()));
+  }
+  const CtImport import = ImportCt(reading.volume, subject.import, context);
+  notes = reading.notes;
+  notes.insert(notes.end(), import.notes.begin(), import.notes.end());
+  AddLandmarks(subject.landmarks, state);
+  FileSubject files = WriteMeshes(import.skull, import.skin, meshes);
+  files.mirror = subject.mirror;
+  return files;
+}
+
+std::string LowerExtension(const fs::path& path) { return LowerCase(path.extension().string()); }
+
+bool IsOneOf(const std::string& extension, std::initializer_list<const char*> extensions) {
+  return std::ranges::find(extensions, extension) != extensions.end();
+}
+
+// The experiment of a workbench that begins without a configuration.
+Experiment DefaultExperiment(const fs::path& folder) {
+  Experiment experiment;
+  experiment.title = "Workbench";
+  experiment.tissue.table = folder / "tables/rhine_caucasoid.yaml";
+  experiment.network = folder / "networks/standard32.yaml";
+  return experiment;
+}
+
+Subject SubjectFromSource(const fs::path& source) {
+  FileSubject files;
+  if (source.empty()) {
+    return files;
+  }
+  if (IsOneOf(LowerExtension(source), {".ply", ".obj", ".stl", ".off"})) {
+    files.skull = fs::absolute(source);
+    return files;
+  }
+  CtSubject ct;
+  ct.volume = fs::absolute(source);
+  return ct;
+}
+
+}  // namespace
+
+BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context) {
+  BenchSubject subject;
+  if (files.skull.empty()) {
+    return subject;
+  }
+  context.Report("read skull");
+  subject.skull.mesh = ReadInMm(files.skull, files);
+  if (!files.mandible.mesh.empty()) {
+    AppendMesh(ReadInMm(files.mandible.mesh, files), subject.skull.mesh);
+  }
+  CheckMesh(subject.skull.mesh, files.skull, subject);
+  subject.skull.view = SimplifyForView(subject.skull.mesh, kSkullTriangles);
+  subject.bone = std::make_shared<const MeshQuery>(subject.skull.mesh);
+  subject.view_bone = std::make_shared<const MeshQuery>(subject.skull.view);
+  if (!files.skin.empty()) {
+    context.Report("read skin");
+    BenchMesh skin{.mesh = ReadInMm(files.skin, files), .view = {}};
+    CheckMesh(skin.mesh, files.skin, subject);
+    skin.view = SimplifyForView(skin.mesh);
+    subject.skin = std::move(skin);
+  }
+  return subject;
+}
+
+FileSubject SubjectAsFiles(const Subject& subject, const fs::path& meshes, BenchState& state,
+                           const RunContext& context, std::vector<std::string>& notes) {
+  return std::visit(
+      [&](const auto& given) { return ToFiles(given, meshes, state, context, notes); }, subject);
+}
+
+BenchBeginning BeginFromConfig(const fs::path& config, const fs::path& meshes,
+                               const RunContext& context) {
+  BenchBeginning beginning{.experiment = ReadConfig<Experiment>(config), .state = {}, .notes = {}};
+  Experiment& experiment = beginning.experiment;
+  if (!experiment.edits.empty()) {
+    beginning.state.edits = ReadEditScript(experiment.edits);
+    experiment.edits.clear();
+  }
+  experiment.subject =
+      SubjectAsFiles(experiment.subject, meshes, beginning.state, context, beginning.notes);
+  if (beginning.state.subject.empty()) {
+    beginning.state.subject = PlainName(config);
+  }
+  return beginning;
+}
+
+BenchBeginning BeginBench(const fs::path& source, const fs::path& folder,
+                          const RunContext& context) {
+  const fs::path meshes = folder / "subject";
+  if (IsOneOf(LowerExtension(source), {".yaml", ".yml"})) {
+    return BeginFromConfig(source, meshes, context);
+  }
+  BenchBeginning beginning{.experiment = DefaultExperiment(folder), .state = {}, .notes = {}};
+  beginning.experiment.subject =
+      SubjectAsFiles(SubjectFromSource(source), meshes, beginning.state, context, beginning.notes);
+  beginning.state.subject = source.empty() ? "subject" : PlainName(source);
+  return beginning;
+}
+
+}  // namespace semblance

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The head on the workbench: its meshes in mm and LPS. Meshes with faults are loaded too, because a
+// person finds the right frame and unit by looking at them.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "problems/experiment/experiment.h"
+#include "problems/app/workbench/bench_state.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance {
+
+struct BenchMesh {
+  TriMesh mesh;  // in full
+  TriMesh view;  // decimated, for display
+};
+
+struct BenchSubject {
+  BenchMesh skull;                // with the mandible as it lies, if that is a separate mesh
+  std::optional<BenchMesh> skin;  // if known
+  std::shared_ptr<const MeshQuery> bone;       // of skull.mesh; null without a skull
+  std::shared_ptr<const MeshQuery> view_bone;  // of skull.view; null without a skull
+  std::vector<std::string> faults;             // reasons why a run would refuse the meshes
+  std::vector<std::string> notes;
+};
+
+// Throws IoError or InputError if a file cannot be read at all.
+BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context);
+
+// Converts any subject to files. Phantoms and volumes are written as meshes to the new folder
+// `meshes`. The subject's landmarks move into `state`. `notes` receives remarks on reading a
+// volume. Throws as LoadSubject does.
+FileSubject SubjectAsFiles(const Subject& subject, const std::filesystem::path& meshes,
+                           BenchState& state, const RunContext& context,
+                           std::vector<std::string>& notes);
+
+// The first state of a workbench.
+struct BenchBeginning {
+  Experiment experiment;  // its subject is a FileSubject
+  BenchState state;
+  std::vector<std::string> notes;  // remarks on reading a volume
+};
+
+// Reads a configuration with its subject, landmarks and edits. meshes: as in SubjectAsFiles. Throws
+// ConfigError, and as LoadSubject does.
+BenchBeginning BeginFromConfig(const std::filesystem::path& config,
+                               const std::filesystem::path& meshes, const RunContext& context);
+
+// source: empty (no head yet), a mesh of a skull, a volume (CT), or a configuration. Phantoms and
+// volumes become meshes in folder/subject; landmarks move into the state. Throws as LoadSubject
+// does.
+BenchBeginning BeginBench(const std::filesystem::path& source, const std::filesystem::path& folder,
+                          const RunContext& context);
+
+}  // namespace semblance

@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/app/all_commands.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <stop_token>
+#include <string>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "problems/app/exit_code.h"
+#include "problems/io/output_folder.h"
+#include "problems/app/program_end.h"
+#include "problems/app/workbench/http_server.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The arguments of the command.
+struct WorkbenchArguments {
+  std::string source, out;
+  std::vector<std::pair<std::string, std::string>> references;
+  int port = 0;
+  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  bool open = false;
+  std::stop_token stop;
+};
+
+// If the source is the folder of a workbench, its work is continued.
+BenchOptions MakeBenchOptions(const WorkbenchArguments& a) {
+  BenchOptions options;
+  options.references = a.references;
+  options.threads = a.threads;
+  if (a.out.empty() && fs::exists(fs::path(a.source) / "workbench.yaml")) {
+    options.folder = a.source;
+    return options;
+  }
+  options.source = a.source;
+  const std::string name = a.source.empty() ? "workbench" : PlainName(a.source);
+  options.folder = a.out.empty() ? "out/" + name + "_workbench" : a.out;
+  if (!a.source.empty() && !fs::exists(a.source)) {
+    throw IoError(fmt::format("{}: no such file or folder", a.source));
+  }
+  return options;
+}
+
+// Passes the address in a file that only this user can read, because other users of this machine
+// can see the arguments of a command.
+void OpenBrowser(const fs::path& folder, const std::string& url) {
+  const std::string file = (folder / ".semblance-workbench" / "open.html").string();
+  const std::string page =
+      fmt::format("<!DOCTYPE html><meta http-equiv=\"refresh\" content=\"0; url={}\">\n", url);
+  ::unlink(file.c_str());
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  const bool written = descriptor >= 0 && ::write(descriptor, page.data(), page.size()) ==
+                                              static_cast<ssize_t>(page.size());
+  ::close(descriptor);
+  if (!written) {
+    throw IoError(
+        fmt::format("{}: cannot be written; open the address in the browser yourself", file));
+  }
+  if (::fork() == 0) {
+    ::execlp("xdg-open", "xdg-open", file.c_str(), nullptr);
+    ::_exit(127);
+  }
+}
+
+int Workbench(const WorkbenchArguments& a) {
+  Bench bench(MakeBenchOptions(a));
+  HttpServerOptions listening;
+  listening.port = a.port;
+  HttpServer server(bench, listening);
+  fmt::print(
+      "folder: {}\nopen in a browser on this machine: {}\nCtrl-C ends the program; nothing is "
+      "lost\n",
+      bench.Folder().string(), server.Url());
+  std::fflush(stdout);
+  if (a.open) {
+    OpenBrowser(bench.Folder(), server.Url());
+  }
+  {
+    const std::jthread serving([&server](const std::stop_token& stop) { server.Serve(stop); });
+    while (!a.stop.stop_requested()) {
+      std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    }
+    RemoveStopTimeout();  // closing open connections may take some seconds
+  }
+  fmt::print("ended; `semblance workbench {}` continues the work\n", bench.Folder().string());
+  return kDone;
+}
+
+void DeclareWorkbench(CLI::App& workbench, CommandLine& line) {
+  WorkbenchArguments& a = *Bind(workbench, line, &Workbench);
+  a.stop = line.stop;
+  workbench.add_option(
+      "SOURCE", a.source,
+      "mesh of a skull, CT (file or DICOM folder), configuration, or the folder of "
+      "a workbench to continue; none: choose in the page");
+  workbench.add_option("--out", a.out,
+                       "folder for the work; work in it is continued [out/NAME_workbench]");
+  workbench.add_option("--port", a.port, "port of 127.0.0.1 [any free one]")
+      ->check(CLI::Range(0, 65535));
+  workbench.add_option(
+      "--reference", a.references,
+      "SKULL LANDMARKS: a skull with known landmarks, for proposals; may be repeated");
+  workbench.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
+      ->check(CLI::Range(1, 1024));
+  workbench.add_flag("--open", a.open, "open the page in the desktop's browser (xdg-open)");
+}
+
+}  // namespace
+
+std::span<const ProgramCommand> WorkbenchCommands() {
+  static constexpr std::array kCommands = {
+      ProgramCommand{"workbench",
+                     "place landmarks and make a face in a browser, on this machine alone",
+                     &DeclareWorkbench},
+  };
+  return kCommands;
+}
+
+}  // namespace semblance

@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/experiment/metrics/outer_skin.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+using Cell = std::array<int, 3>;
+
+// The places that the ball's centre can reach: cells of a box, represented by their middles.
+class ProbeGrid {
+ public:
+  ProbeGrid(const Box3& box, double probe_mm, const std::vector<CutPlane>& ends)
+      : probe_mm_(probe_mm), cell_mm_(probe_mm / kCellsPerProbe) {
+    Box3 room = box;
+    room.min().array() -= probe_mm + 3 * cell_mm_;
+    room.max().array() += probe_mm + 3 * cell_mm_;
+    origin_ = room.min();
+    for (int axis = 0; axis < 3; ++axis) {
+      size_[axis] = static_cast<int>(std::ceil(room.sizes()[axis] / cell_mm_));
+    }
+    state_.assign(std::size_t(size_[0]) * size_[1] * size_[2], kFree);
+    for (const CutPlane& end : ends) {
+      CloseBeyond(end);
+    }
+  }
+
+  // Bars all centres that are nearer to p than the ball's radius.
+  void KeepOff(const Vec3& p) {
+    ForRowsWithin(p, probe_mm_, [&](std::size_t first, std::size_t last, const Vec3&) {
+      std::fill(state_.begin() + std::ptrdiff_t(first), state_.begin() + std::ptrdiff_t(last) + 1,
+                kBarred);
+      return false;
+    });
+  }
+
+  // Moves the ball in from all free faces of the box.
+  void Flood() {
+    std::vector<Cell> open;
+    ForFaces([&](const Cell& c) { Enter(c, open); });
+    while (!open.empty()) {
+      const Cell c = open.back();
+      open.pop_back();
+      for (int axis = 0; axis < 3; ++axis) {
+        for (const int step : {-1, 1}) {
+          Cell next = c;
+          next[axis] += step;
+          if (next[axis] >= 0 && next[axis] < size_[axis]) {
+            Enter(next, open);
+          }
+        }
+      }
+    }
+  }
+
+  // True if the ball reached a place in which it touches p on the outer side of the normal.
+  bool Touches(const Vec3& p, const Vec3& normal) const {
+    const double reach_mm = probe_mm_ + std::numbers::sqrt3 * cell_mm_;
+    return ForRowsWithin(
+        p, reach_mm, [&](std::size_t first, std::size_t last, const Vec3& offset_of_first) {
+          double outward = offset_of_first.dot(normal);
+          for (std::size_t cell = first; cell <= last; ++cell, outward += cell_mm_ * normal.x()) {
+            if (state_[cell] == kReached && outward > 0) {
+              return true;
+            }
+          }
+          return false;
+        });
+  }
+
+ private:
+  enum State : std::uint8_t { kFree, kBarred, kReached };
+  static constexpr int kCellsPerProbe = 6;
+
+  std::size_t IndexOf(const Cell& c) const {
+    return (std::size_t(c[2]) * size_[1] + c[1]) * size_[0] + c[0];
+  }
+  Vec3 Middle(const Cell& c) const {
+    return origin_ + cell_mm_ * Vec3(c[0] + 0.5, c[1] + 0.5, c[2] + 0.5);
+  }
+  void Enter(const Cell& c, std::vector<Cell>& open) {
+    std::uint8_t& state = state_[IndexOf(c)];
+    if (state == kFree) {
+      state = kReached;
+      open.push_back(c);
+    }
+  }
+  void CloseBeyond(const CutPlane& end) {
+    ForCells({0, 0, 0}, {size_[0] - 1, size_[1] - 1, size_[2] - 1}, [&](const Cell& c) {
+      if (end.Beyond_mm(Middle(c)) > 0) {
+        state_[IndexOf(c)] = kBarred;
+      }
+      return false;
+    });
+  }
+
+  // Calls visit(cell) from first to last, x fastest, until it returns true. Returns whether it did.
+  template <class Visit>
+  static bool ForCells(const Cell& first, const Cell& last, const Visit& visit) {
+    for (int z = first[2]; z <= last[2]; ++z) {
+      for (int y = first[1]; y <= last[1]; ++y) {
+        for (int x = first[0]; x <= last[0]; ++x) {
+          if (visit(Cell{x, y, z})) {
+            return true;
+          }
+        }
+      }
+    }
+    return false;
+  }
+  // Calls visit(first, last, middle of first - p) for each row along x of cells whose middles are
+  // closer to p than radius_mm, until it returns true. Returns whether it did.
+  template <class Visit>
+  bool ForRowsWithin(const Vec3& p, double radius_mm, const Visit& visit) const {
+    const Vec3 at = (p - origin_) / cell_mm_ - Vec3::Constant(0.5);  // in cells, of middles
+    const double radius = radius_mm / cell_mm_;
+    const auto range = [&](int axis, double reach) {
+      return std::pair(std::max(0, static_cast<int>(std::ceil(at[axis] - reach))),
+                       std::min(size_[axis] - 1, static_cast<int>(std::floor(at[axis] + reach))));
+    };
+    const auto [z0, z1] = range(2, radius);
+    const auto [y0, y1] = range(1, radius);
+    for (int z = z0; z <= z1; ++z) {
+      for (int y = y0; y <= y1; ++y) {
+        const double rest =
+            radius * radius - (z - at.z()) * (z - at.z()) - (y - at.y()) * (y - at.y());
+        const auto [x0, x1] = range(0, rest > 0 ? std::sqrt(rest) : -1);
+        if (x0 <= x1 && visit(IndexOf({x0, y, z}), IndexOf({x1, y, z}), Middle({x0, y, z}) - p)) {
+          return true;
+        }
+      }
+    }
+    return false;
+  }
+  template <class Visit>
+  void ForFaces(const Visit& visit) const {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const int at : {0, size_[axis] - 1}) {
+        Cell first = {0, 0, 0}, last = {size_[0] - 1, size_[1] - 1, size_[2] - 1};
+        first[axis] = last[axis] = at;
+        ForCells(first, last, [&](const Cell& c) {
+          visit(c);
+          return false;
+        });
+      }
+    }
+  }
+
+  double probe_mm_, cell_mm_;
+  Vec3 origin_;
+  Cell size_ = {0, 0, 0};
+  std::vector<std::uint8_t> state_;
+};
+
+// Visits points of the mesh: all corners, and more on large triangles. Every place of the surface
+// lies within about half of spacing_mm of one of them.
+template <class Visit>
+void ForPointsOn(const TriMesh& mesh, double spacing_mm, const Visit& visit) {
+  std::ranges::for_each(mesh.points, visit);
+  for (const Triangle& t : mesh.triangles) {
+    const Vec3 &a = mesh.points[t[0]], &b = mesh.points[t[1]], &c = mesh.points[t[2]];
+    const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
+    const int n = static_cast<int>(std::ceil(longest / spacing_mm));
+    for (int i = 0; i <= n && n > 1; ++i) {
+      for (int j = 0; j <= n - i; ++j) {
+        visit(Vec3((double(n - i - j) * a + double(i) * b + double(j) * c) / n));
+      }
+    }
+  }
+}
+
+std::vector<CutPlane> FindEnds(const TriMesh& skin) {
+  std::vector<CutPlane> ends = FindCutPlanes(skin);
+  const std::vector<CutPlane> lids = FindLids(skin);
+  ends.insert(ends.end(), lids.begin(), lids.end());
+  return ends;
+}
+
+void CheckSize(const TriMesh& skin, double probe_mm) {
+  constexpr double kLargestSize_probes = 1000;  // bounds the grid's memory
+  const double size_mm = Bounds(skin).sizes().maxCoeff();
+  if (skin.triangles.empty() || !(size_mm <= kLargestSize_probes * probe_mm)) {
+    throw InputError(
+        fmt::format("outer skin: a mesh of {} triangles, {:.4g} mm long, cannot be felt with a "
+                    "probe of {} mm; give a head in mm, or a larger probe_mm",
+                    skin.triangles.size(), size_mm, probe_mm));
+  }
+}
+
+}  // namespace
+
+OuterSkin FindOuterSkin(const TriMesh& skin, double probe_mm) {
+  CheckSize(skin, probe_mm);
+  OuterSkin result{std::vector<bool>(skin.points.size(), false), FindEnds(skin)};
+  ProbeGrid grid(Bounds(skin), probe_mm, result.ends);
+  ForPointsOn(skin, probe_mm / 3, [&](const Vec3& p) { grid.KeepOff(p); });
+  grid.Flood();
+  const std::vector<Vec3> normals = VertexNormals(skin);
+  for (std::size_t v = 0; v < skin.points.size(); ++v) {
+    result.outer[v] = grid.Touches(skin.points[v], normals[v]);
+  }
+  return result;
+}
+
+}  // namespace semblance

@@ -1,0 +1,257 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/experiment/skull_stage.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstring>
+#include <span>
+#include <string>
+#include <type_traits>
+
+#include "problems/io/manifest.h"
+#include "problems/experiment/dowel_placement.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/experiment/extra_dowels.h"
+
+namespace semblance {
+namespace {
+
+template <class T>
+requires std::is_trivially_copyable_v<T>
+void Append(std::string& bytes, const T& value) {
+  bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+}
+
+void Append(std::string& bytes, std::span<const double> values) {
+  bytes.append(reinterpret_cast<const char*>(values.data()), values.size_bytes());
+}
+
+void Append(std::string& bytes, const TriMesh& mesh) {
+  Append(bytes, mesh.points.size());
+  Append(bytes, mesh.triangles.size());
+  for (const Vec3& point : mesh.points) {
+    Append(bytes, std::span<const double>(point.data(), 3));
+  }
+  for (const Triangle& triangle : mesh.triangles) {
+    Append(bytes, triangle);
+  }
+}
+
+// Takes values off the front. If the bytes run out, all later values are invalid and
+// WholeAndEmpty() is false.
+class Reader {
+ public:
+  explicit Reader(std::string_view bytes) : rest_(bytes) {}
+
+  template <class T>
+  requires std::is_trivially_copyable_v<T>
+  void Take(T& value) { Take(&value, sizeof(T)); }
+  void Take(TriMesh& mesh) {
+    mesh.points.resize(TakeCount(3 * sizeof(double)));
+    mesh.triangles.resize(TakeCount(sizeof(Triangle)));
+    for (Vec3& point : mesh.points) {
+      Take(point.data(), 3 * sizeof(double));
+    }
+    for (Triangle& triangle : mesh.triangles) {
+      Take(triangle);
+    }
+  }
+  void Take(std::string& text) {
+    text.resize(TakeCount(1));
+    Take(text.data(), text.size());
+  }
+  // A count of items of bytes_each bytes; 0 if fewer bytes are left.
+  std::size_t TakeCount(std::size_t bytes_each) {
+    std::size_t count = 0;
+    Take(count);
+    whole_ &= count <= rest_.size() / bytes_each;
+    return whole_ ? count : 0;
+  }
+  bool WholeAndEmpty() const { return whole_ && rest_.empty(); }
+
+ private:
+  void Take(void* to, std::size_t size) {
+    whole_ &= size <= rest_.size();
+    if (whole_ && size > 0) {
+      std::memcpy(to, rest_.data(), size);
+      rest_.remove_prefix(size);
+    }
+  }
+
+  std::string_view rest_;
+  bool whole_ = true;
+};
+
+// Part of the key, because another build may compute other bits.
+const std::string& ProgramHash() {
+  static const std::string hash = Sha256OfFile("/proc/self/exe");
+  return hash;
+}
+
+std::string MakeKey(const TriMesh& shell, std::span<const double> depth_mm,
+                    const ImplicitFaceOptions& options) {
+  std::string made_from = StageKey("implicit face", options) + ProgramHash();
+  Append(made_from, shell);
+  Append(made_from, depth_mm);
+  return Sha256OfText(made_from);
+}
+
+}  // namespace
+
+std::string ToBytes(const ImplicitFace& face) {
+  std::string bytes;
+  Append(bytes, face.dense);
+  Append(bytes, face.mesh);
+  Append(bytes, face.cell_mm);
+  Append(bytes, face.emitters);
+  Append(bytes, face.emitters_per_square_depth);
+  Append(bytes, face.dropped_components);
+  Append(bytes, face.counts);
+  Append(bytes, face.decimation);
+  Append(bytes, face.notes.size());
+  for (const std::string& note : face.notes) {
+    Append(bytes, note.size());
+    bytes += note;
+  }
+  return bytes;
+}
+
+std::optional<ImplicitFace> ImplicitFaceFrom(std::string_view bytes) {
+  Reader reader(bytes);
+  ImplicitFace face;
+  reader.Take(face.dense);
+  reader.Take(face.mesh);
+  reader.Take(face.cell_mm);
+  reader.Take(face.emitters);
+  reader.Take(face.emitters_per_square_depth);
+  reader.Take(face.dropped_components);
+  reader.Take(face.counts);
+  reader.Take(face.decimation);
+  face.notes.resize(reader.TakeCount(sizeof(std::size_t)));
+  for (std::string& note : face.notes) {
+    reader.Take(note);
+  }
+  return reader.WholeAndEmpty() ? std::optional(std::move(face)) : std::nullopt;
+}
+
+ImplicitFace CachedImplicitFace(const TriMesh& shell, std::span<const double> depth_mm,
+                                const ImplicitFaceOptions& options, const DiskCache* cache,
+                                const RunContext& context) {
+  if (!cache) {
+    return BuildImplicitFace(shell, depth_mm, options, context);
+  }
+  const std::string key = MakeKey(shell, depth_mm, options);
+  if (const std::optional<std::string> bytes = cache->Get(key)) {
+    if (std::optional<ImplicitFace> face = ImplicitFaceFrom(*bytes)) {
+      return std::move(*face);
+    }
+  }
+  ImplicitFace face = BuildImplicitFace(shell, depth_mm, options, context);
+  cache->Put(key, ToBytes(face));
+  return face;
+}
+
+namespace {
+
+// Notes the parameters of the depth process that the dowels do not determine.
+void NoteEnds(const DepthField& depth, std::vector<std::string>& notes) {
+  for (const std::string& words :
+       depth.process ? depth.process->at_end : std::vector<std::string>()) {
+    notes.push_back(fmt::format(
+        "interp: {}, and the likelihood would go on; the dowels do not determine it. Set "
+        "length_mm or signal_mm, or a smaller length_prior_spread",
+        words));
+  }
+}
+
+DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& step,
+                           const RunContext& context) {
+  constexpr double kLeastDepth_mm = 1;  // of a dowel on the shell
+  const auto data = step("load subject", [&] {
+    return cache.Get<SubjectData>(StageKey("subject", e.subject),
+                                  [&] { return LoadSubject(e.subject, context); });
+  });
+  Case subject = MakeCase(*data, e);
+  const auto shell = step("fill skull", [&] {
+    return cache.Get<TriMesh>(StageKey("shell", e.subject, e.fill),
+                              [&] { return FillSkull(data->skull, e.fill, context); });
+  });
+  const auto* const wrap = std::get_if<WrapFill>(&e.fill);
+  TriMesh pressed =
+      wrap ? IndentShell(*shell, subject.dowels_on_bone, data->skull, wrap->press_mm) : *shell;
+  ProjectedDowels projected = ProjectOntoShell(subject.dowels_on_bone, pressed, kLeastDepth_mm);
+  subject.notes.insert(subject.notes.end(), projected.notes.begin(), projected.notes.end());
+  std::vector<Vec3> normals = VertexNormals(pressed);
+  ProjectedDowels expected = ProjectOntoShell(subject.expected_on_bone, pressed, kLeastDepth_mm);
+  ProjectedDowels scored = ProjectOntoShell(subject.scored_on_bone, pressed, kLeastDepth_mm);
+  DepthStage stage{std::move(subject),
+                   std::move(pressed),
+                   std::move(normals),
+                   std::move(projected.dowels_on_shell),
+                   std::move(expected.dowels_on_shell),
+                   std::move(scored.dowels_on_shell),
+                   {}};
+  stage.depth = step("interpolate depth", [&] {
+    return ApplyOutsideRule(e.outside, stage.Input(),
+                            InterpolateDepth(e.interp, stage.Input(), context), context);
+  });
+  NoteEnds(stage.depth, stage.subject.notes);
+  FillOpenDowels(stage.shell, stage.depth, stage.subject);
+  return stage;
+}
+
+// The key of the depth. It includes the generic face if a dowel is placed by its (u,v).
+std::string MakeDepthKey(const Experiment& e) {
+  std::string key = StageKey("depth", e.subject, e.landmarks, e.tissue, e.sites, e.network,
+                             e.interp, e.outside, e.fill);
+  return std::ranges::any_of(e.sites, [](const auto& entry) { return entry.second.uv.has_value(); })
+             ? key + StageKey("placed on", e.face_template, e.placement)
+             : key;
+}
+
+}  // namespace
+
+std::shared_ptr<const DepthStage> MakeDepthStage(const Experiment& e, StageCache& cache,
+                                                 StepClock& step, const RunContext& context) {
+  return cache.Get<DepthStage>("stage " + MakeDepthKey(e),
+                               [&] { return BuildDepthStage(e, cache, step, context); });
+}
+
+namespace {
+
+// The shell's depths, without those on the lids that close it where the scan was cut off. The face
+// then ends there.
+std::vector<double> DepthsToTheEnds(const DepthStage& stage, std::span<const CutPlane> cuts) {
+  constexpr double kLid_mm = 1;  // vertices within this of the cut belong to the lid
+  std::vector<double> depth_mm = stage.depth.depth_mm;
+  for (const CutPlane& plane : cuts) {
+    for (std::size_t v = 0; v < depth_mm.size(); ++v) {
+      depth_mm[v] = plane.Beyond_mm(stage.shell.points[v]) > -kLid_mm ? kNaN : depth_mm[v];
+    }
+  }
+  return depth_mm;
+}
+
+}  // namespace
+
+std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache& cache,
+                                                 StepClock& step, const RunContext& context) {
+  return cache.Get<SkullStage>(StageKey("skull stage", e.implicit) + MakeDepthKey(e), [&] {
+    auto depth = MakeDepthStage(e, cache, step, context);
+    const TriMesh& skull = depth->subject.skull;
+    std::vector<BoneOrigin> origin = step("observed bone", [&] {
+      return OriginOfShell(depth->shell, skull, depth->subject.origin, context.threads);
+    });
+    std::vector<CutPlane> cuts = FindCutPlanes(skull);
+    ImplicitFace implicit = step("implicit face", [&] {
+      return CachedImplicitFace(depth->shell,
+                                e.implicit.ends == FaceEnds::kOpen ? DepthsToTheEnds(*depth, cuts)
+                                                                   : depth->depth.depth_mm,
+                                e.implicit, cache.disk(), context);
+    });
+    return SkullStage{std::move(depth), std::move(origin), std::move(cuts), std::move(implicit)};
+  });
+}
+
+}  // namespace semblance

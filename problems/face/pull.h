@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Pulls a surface by hand. The control vertices of a level that carry the held point move with it
+// (direct manipulation, Forsey & Bartels 1988). The result is an edit script.
+#pragma once
+
+#include <map>
+#include <optional>
+
+#include "problems/face/edit_script.h"
+
+namespace semblance {
+
+struct Pull {
+  int level = 2;                      // level whose vertices move; a coarser one moves more
+  Vec2 uv = Vec2::Constant(kNaN);     // the held point
+  Vec3 by_mm = Vec3::Constant(kNaN);  // its displacement, in world axes
+  double reach = 2;                   // vertices within this move, in patches of the level
+  bool mirror = false;                // also pulls the other side, (1-u, v)
+};
+
+// Adds the pull to `script`. If the script changes some surface into `face`, the returned script
+// changes that surface into the pulled face. Each vertex within `reach` moves by by_mm times
+// (1 - (distance / reach)^2)^2, scaled so that the point at `uv` moves by by_mm. Finer detail
+// follows. With `mirror` both sides move, mirrored at the plane that the face's own (u,v) defines.
+// A point of the midline then stays in that plane. Throws InputError for a missing level, for
+// numbers that are not finite, for a reach outside 1..8 patches, and as SetNet does.
+EditScript Pulled(const Pull& pull, const HSplineSurface& face, const EditScript& script);
+
+// `script` with these offsets (null: removed) in place of its own edits of the same vertices.
+EditScript WithOffsets(EditScript script, const std::map<VertexId, std::optional<Vec3>>& offsets);
+
+// The unit direction from the subject's right to the left: the mean direction from (1-u, v) to (u,
+// v). Throws InputError if the face has no such direction.
+Vec3 FindLeft(const HSplineSurface& face);
+
+}  // namespace semblance

@@ -1,0 +1,506 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/face/shape_model/shape_fit.h"
+
+#include <ceres/cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/normal_prior.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <span>
+#include <utility>
+
+#include "problems/face/shape_model/shape_model.h"
+#include "problems/face/shape_model/shape_posterior.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/farthest_first.h"
+#include "surfaces/mesh/correspondences.h"
+
+namespace semblance {
+namespace {
+
+constexpr int kPoseRounds = 2;              // first rounds, which move the pose alone
+constexpr int kFirstSurfaceRound = 3;       // counted from 0; before, points would find wrong feet
+constexpr double kMoveTolerance_mm = 5e-3;  // ends the rounds; far below any error of the data
+
+// Residual whitening * (x - position), where x is the placed point of the observation. Parameter
+// blocks: the pose, the coefficients and, if there is one, the field.
+class ShapeCost final : public ceres::CostFunction {
+ public:
+  // Both must outlive the cost.
+  ShapeCost(const ShapeFrame& frame, const ShapeObservation& observation);
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const ShapeFrame& frame_;
+  const ShapeObservation& seen_;
+};
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+ShapeCost::ShapeCost(const ShapeFrame& frame, const ShapeObservation& observation)
+    : frame_(frame), seen_(observation) {
+  set_num_residuals(static_cast<int>(seen_.whitening.rows()));
+  mutable_parameter_block_sizes()->push_back(7);
+  mutable_parameter_block_sizes()->push_back(static_cast<int>(seen_.row.modes.cols()));
+  if (seen_.row.field.size() > 0) {
+    mutable_parameter_block_sizes()->push_back(static_cast<int>(3 * seen_.row.field.size()));
+  }
+}
+
+bool ShapeCost::Evaluate(const double* const* parameters, double* residuals,
+                         double** jacobians) const {
+  const std::size_t modes = seen_.row.modes.cols(), field = 3 * seen_.row.field.size();
+  ShapeDerivatives derivatives;
+  const Vec3 x = PlacedPoint(frame_, seen_.row, {parameters[0], 7}, {parameters[1], modes},
+                             {field > 0 ? parameters[2] : nullptr, field}, &derivatives);
+  const Eigen::Index rows = seen_.whitening.rows();
+  Eigen::Map<Eigen::VectorXd>(residuals, rows) = seen_.whitening * (x - seen_.position);
+  if (jacobians == nullptr) {
+    return true;
+  }
+  RowMajor all(rows, 7 + modes + field);
+  for (Eigen::Index r = 0; r < rows; ++r) {
+    all.row(r) = DerivativeAlong(seen_.whitening.row(r).transpose(), seen_.row, derivatives);
+  }
+  Eigen::Index begin = 0;
+  for (std::size_t block = 0; block < parameter_block_sizes().size(); ++block) {
+    const int size = parameter_block_sizes()[block];
+    if (jacobians[block] != nullptr) {
+      Eigen::Map<RowMajor>(jacobians[block], rows, size) = all.middleCols(begin, size);
+    }
+    begin += size;
+  }
+  return true;
+}
+
+// ---------------------------------------------------------------------------------------------
+// Checks
+// ---------------------------------------------------------------------------------------------
+
+void CheckTips(const ShapeModel& model, const ShapeTarget& target) {
+  for (const ShapeTip& tip : target.tips) {
+    if (tip.at.triangle < 0 ||
+        static_cast<std::size_t>(tip.at.triangle) >= model.mean.triangles.size() ||
+        !tip.at.weights.allFinite()) {
+      throw InputError(
+          fmt::format("shape model: '{}' has no point on the model's mesh", tip.label));
+    }
+    if (!tip.position.allFinite() || !tip.direction.allFinite() || !(tip.along_sd_mm >= 0)) {
+      throw InputError(
+          fmt::format("shape model: the tip of '{}' is not finite; leave it out", tip.label));
+    }
+  }
+  for (const ShapeMark& mark : target.marks) {
+    if (mark.at.empty() || !mark.position.allFinite() || !mark.direction.allFinite() ||
+        !(mark.sd_mm > 0)) {
+      throw InputError(fmt::format(
+          "shape model: the mark '{}' has no point, place, direction or deviation", mark.label));
+    }
+  }
+  for (const auto* sd_mm : {&target.surface_sd_mm, &target.surface_error_mm}) {
+    if (target.surface != nullptr && !sd_mm->empty() &&
+        sd_mm->size() != target.surface->points.size()) {
+      throw InputError(fmt::format(
+          "shape model: {} deviations for the {} points of the surface; give one per point or none",
+          sd_mm->size(), target.surface->points.size()));
+    }
+  }
+  if (!(target.start.scale > 0)) {
+    throw InputError(
+        fmt::format("shape model: scale {} of the start; it must be positive", target.start.scale));
+  }
+}
+
+// ---------------------------------------------------------------------------------------------
+// Points of the model that are used
+// ---------------------------------------------------------------------------------------------
+
+// Indices of at most `count` points that lie far apart, beginning with point 0.
+std::vector<int> SpreadPoints(std::span<const Vec3> points, int count) {
+  const std::vector<std::size_t> some =
+      FarthestFirst(points, 0, static_cast<std::size_t>(count), Coincident::kLeftOut);
+  return {some.begin(), some.end()};
+}
+
+std::vector<Vec3> FeaturePositions(const ShapeTarget& target) {
+  std::vector<Vec3> positions;
+  for (const ShapeFeature& feature : target.features) {
+    positions.push_back(feature.position);
+  }
+  return positions;
+}
+
+// The tip nearest to a point of the mean.
+struct NearestTip {
+  double squared_mm = 0;    // squared distance; 0 without tips
+  double shared_sd_mm = 0;  // ShapeTip::shared_sd_mm
+};
+
+NearestTip NearestTipTo(const Vec3& p, const ShapeModel& model, const ShapeTarget& target) {
+  NearestTip nearest;
+  bool first = true;
+  for (const ShapeTip& tip : target.tips) {
+    const Vec3 at = PositionOf(tip.at, model.mean, model.mean.points);
+    const double squared_mm = (at - p).squaredNorm();
+    if (std::exchange(first, false) || squared_mm < nearest.squared_mm) {
+      nearest = {squared_mm, tip.shared_sd_mm};
+    }
+  }
+  return nearest;
+}
+
+// The additional standard deviation of a point far from all observations, where the modes alone are
+// too confident. It is 0 without observations, because then the modes are the only information.
+double UnseenSd_mm(const Vec3& p, std::span<const ShapeObservation> seen,
+                   const ShapeFitOptions& options) {
+  if (seen.empty()) {
+    return 0;
+  }
+  double nearest = std::numeric_limits<double>::infinity();
+  for (const ShapeObservation& one : seen) {
+    nearest = std::min(nearest, (one.row.mean - p).squaredNorm());
+  }
+  return options.unseen_rate * std::max(0.0, std::sqrt(nearest) - options.unseen_reach_mm);
+}
+
+// A point of the model that is drawn to the surface.
+struct DrawnPoint {
+  int vertex = -1;
+  double shared_sd_mm = 0;  // ShapeTip::shared_sd_mm of the nearest tip
+};
+
+// Points of the model that lie near a tip and away from the features, spread evenly.
+std::vector<DrawnPoint> DrawnPoints(const ShapeModel& model, const ShapeTarget& target,
+                                    const ShapeFitOptions& options) {
+  const double farthest = options.surface_range_mm * options.surface_range_mm;
+  std::vector<int> candidates;
+  std::vector<Vec3> places;
+  for (int v = 0; v < static_cast<int>(model.mean.points.size()); ++v) {
+    const Vec3& p = model.mean.points[v];
+    const bool clear = std::ranges::none_of(target.features, [&](const ShapeFeature& f) {
+      return (p - f.position).squaredNorm() <= f.clearance_mm * f.clearance_mm;
+    });
+    if (clear && NearestTipTo(p, model, target).squared_mm <= farthest) {
+      candidates.push_back(v);
+      places.push_back(p);
+    }
+  }
+  std::vector<DrawnPoint> drawn;
+  for (const int k : SpreadPoints(places, options.surface_points)) {
+    drawn.push_back({candidates[k], NearestTipTo(places[k], model, target).shared_sd_mm});
+  }
+  return drawn;
+}
+
+// ---------------------------------------------------------------------------------------------
+// The surface
+// ---------------------------------------------------------------------------------------------
+
+class DrawingSurface {
+ public:
+  DrawingSurface(const ShapeTarget& target, const ShapeFitOptions& options)
+      : mesh_(*target.surface),
+        sd_mm_(target.surface_sd_mm),
+        error_mm_(target.surface_error_mm.empty() ? target.surface_sd_mm : target.surface_error_mm),
+        otherwise_sd_mm_(options.surface_sd_mm),
+        correspondences_(mesh_, OpenBorder::kReject),
+        match_{.reach_mm = options.surface_reach_mm,
+               .least_cosine = std::cos(options.surface_max_angle_deg * std::numbers::pi / 180)} {}
+
+  struct Foot {
+    Vec3 position, normal;
+    double sd_mm;     // for the weight
+    double error_mm;  // for sigma
+  };
+  // The foot of a point with this normal, if it is within reach and faces the same way.
+  std::optional<Foot> FindFoot(const Vec3& p, const Vec3& normal) const {
+    const auto found = correspondences_.Find(p, normal, match_);
+    return found ? std::optional(Foot{found->point.position, found->normal,
+                                      ValueAt(found->point, sd_mm_),
+                                      ValueAt(found->point, error_mm_)})
+                 : std::nullopt;
+  }
+
+ private:
+  double ValueAt(const MeshPoint& at, std::span<const double> values) const {
+    if (values.empty()) {
+      return otherwise_sd_mm_;
+    }
+    const Triangle& t = mesh_.triangles[at.triangle];
+    return at.weights[0] * values[t[0]] + at.weights[1] * values[t[1]] +
+           at.weights[2] * values[t[2]];
+  }
+
+  const TriMesh& mesh_;
+  std::span<const double> sd_mm_, error_mm_;  // one per point; empty: otherwise_sd_mm_
+  double otherwise_sd_mm_;
+  Correspondences correspondences_;
+  CorrespondenceOptions match_;
+};
+
+// ---------------------------------------------------------------------------------------------
+// The estimate
+// ---------------------------------------------------------------------------------------------
+
+class ShapeEstimator {
+ public:
+  ShapeEstimator(const ShapeModel& model, const ShapeTarget& target, const ShapeFitOptions& options)
+      : model_(model),
+        target_(target),
+        options_(options),
+        prior_{.scale_sd = options.scale_sd,
+               .mode_sd = options.mode_sd,
+               .population_sd = options.population_sd},
+        frame_(StartFrame(model, target.start)) {
+    const std::vector<int> centres = SpreadPoints(model.mean.points, options.field.centres);
+    field_ = SmoothFieldFactor(model.mean.points, centres, FeaturePositions(target), options.field);
+    parameters_ = StartParameters(frame_, target.start, model.Modes(), std::ssize(centres));
+    start_pose_ = parameters_.pose;
+    if (target.surface != nullptr && options.surface_points > 0 && options.surface_worth > 0) {
+      surface_.emplace(target, options);
+      drawn_ = DrawnPoints(model, target, options);
+    }
+  }
+
+  void Round(int round);
+  ShapeEstimate Result(const RunContext& context);
+  bool HasConverged(int round) const {
+    return round > kFirstSurfaceRound && last_move_mm_ < kMoveTolerance_mm;
+  }
+
+ private:
+  void Place();
+  void ObserveTips();
+  void ObserveMarks();
+  void ObserveSurface();
+  void Solve(bool pose_alone);
+  void AddPriors(ceres::Problem& problem);
+  void ComputeSpread(const RunContext& context, ShapeEstimate& result) const;
+
+  const ShapeModel& model_;
+  const ShapeTarget& target_;
+  const ShapeFitOptions& options_;
+  ShapePrior prior_;
+  ShapeFrame frame_;
+  Eigen::MatrixXd field_;
+  std::optional<DrawingSurface> surface_;
+  std::vector<DrawnPoint> drawn_;
+
+  ShapeParameters parameters_;
+  std::array<double, 7> start_pose_;
+  TriMesh placed_;             // the present shape
+  std::vector<Vec3> normals_;  // one per point of placed_
+  std::vector<ShapeObservation> seen_;
+  int surface_points_ = 0, rounds_ = 0;
+  double last_move_mm_ = kNaN;
+  bool usable_ = true;
+};
+
+void ShapeEstimator::Place() {
+  placed_ = {PlacedPoints(frame_, model_, field_, parameters_), model_.mean.triangles};
+  normals_ = VertexNormals(placed_);
+}
+
+Vec3 NormalAt(const ModelPoint& at, const TriMesh& mesh, const std::vector<Vec3>& normals) {
+  return PositionOf(at, mesh, normals).normalized();
+}
+
+void ShapeEstimator::ObserveTips() {
+  for (const ShapeTip& tip : target_.tips) {
+    const PointSpread spread{.normal = NormalAt(tip.at, model_.mean, normals_),
+                             .normal_sd_mm = options_.tip_normal_sd_mm,
+                             .tangent_sd_mm = options_.tip_tangent_sd_mm,
+                             .direction = tip.direction,
+                             .along_sd_mm = tip.along_sd_mm};
+    seen_.push_back({.row = PointRowAt(model_, field_, tip.at),
+                     .position = tip.position,
+                     .whitening = MakeWhitening(spread),
+                     .loss_width = options_.tip_loss_width,
+                     .shared_mm = tip.shared_sd_mm * tip.direction});
+  }
+}
+
+ShapeRow MeanRow(const ShapeModel& model, const Eigen::MatrixXd& field,
+                 const std::vector<ModelPoint>& at) {
+  ShapeRow mean = PointRowAt(model, field, at.front());
+  for (std::size_t k = 1; k < at.size(); ++k) {
+    const ShapeRow row = PointRowAt(model, field, at[k]);
+    mean.mean += row.mean;
+    mean.modes += row.modes;
+    mean.field += row.field;
+  }
+  const auto count = static_cast<double>(at.size());
+  return {mean.mean / count, mean.modes / count, mean.field / count};
+}
+
+void ShapeEstimator::ObserveMarks() {
+  for (const ShapeMark& mark : target_.marks) {
+    seen_.push_back({.row = MeanRow(model_, field_, mark.at),
+                     .position = mark.position,
+                     .whitening = mark.direction.transpose() / mark.sd_mm,
+                     .loss_width = options_.tip_loss_width});
+  }
+}
+
+void ShapeEstimator::ObserveSurface() {
+  surface_points_ = 0;
+  const double weight = options_.surface_worth / options_.surface_points;
+  for (const auto& [v, shared_sd_mm] : drawn_) {
+    if (const auto foot = surface_->FindFoot(placed_.points[v], normals_[v])) {
+      seen_.push_back({.row = VertexRow(model_, field_, v),
+                       .position = foot->position,
+                       .whitening = foot->normal.transpose() / foot->sd_mm,
+                       .loss_width = options_.surface_loss_width,
+                       .weight = weight,
+                       .shared_mm = shared_sd_mm * foot->normal,
+                       .smooth_sd_mm = foot->error_mm});
+      ++surface_points_;
+    }
+  }
+}
+
+void ShapeEstimator::AddPriors(ceres::Problem& problem) {
+  const auto add = [&](double* block, const Eigen::VectorXd& mean, const Eigen::VectorXd& sd) {
+    const Eigen::MatrixXd root = sd.cwiseInverse().asDiagonal();
+    problem.AddResidualBlock(new ceres::NormalPrior(root, mean), nullptr, block);
+  };
+  Eigen::VectorXd pose = Eigen::Map<const Eigen::VectorXd>(start_pose_.data(), 7);
+  pose[0] = 0;  // the model's own size
+  const Eigen::VectorXd sd = prior_.Deviations(parameters_);
+  add(parameters_.pose.data(), pose, sd.head(7));
+  const Eigen::Index k = parameters_.coefficients.size(), m = parameters_.field.size();
+  add(parameters_.coefficients.data(), Eigen::VectorXd::Zero(k), sd.segment(7, k));
+  if (m > 0) {
+    add(parameters_.field.data(), Eigen::VectorXd::Zero(m), sd.tail(m));
+  }
+}
+
+void ShapeEstimator::Solve(bool pose_alone) {
+  ceres::Problem problem;
+  AddPriors(problem);
+  for (const ShapeObservation& one : seen_) {
+    std::vector<double*> blocks = {parameters_.pose.data(), parameters_.coefficients.data()};
+    if (parameters_.field.size() > 0) {
+      blocks.push_back(parameters_.field.data());
+    }
+    auto* const loss = new ceres::ScaledLoss(new ceres::HuberLoss(one.loss_width), one.weight,
+                                             ceres::TAKE_OWNERSHIP);
+    problem.AddResidualBlock(new ShapeCost(frame_, one), loss, blocks);
+  }
+  if (pose_alone) {
+    problem.SetParameterBlockConstant(parameters_.coefficients.data());
+    if (parameters_.field.size() > 0) {
+      problem.SetParameterBlockConstant(parameters_.field.data());
+    }
+  }
+  ceres::Solver::Options solver;
+  solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
+  solver.max_num_iterations = 4;  // the observations change with the next round
+  solver.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(solver, &problem, &summary);
+  usable_ = usable_ && summary.IsSolutionUsable();
+}
+
+// The largest distance between the points of two rounds.
+double LargestMove(const std::vector<Vec3>& before, const std::vector<Vec3>& after) {
+  double most = 0;
+  for (std::size_t v = 0; v < before.size(); ++v) {
+    most = std::max(most, (after[v] - before[v]).norm());
+  }
+  return most;
+}
+
+void ShapeEstimator::Round(int round) {
+  Place();
+  seen_.clear();
+  ObserveTips();
+  ObserveMarks();
+  if (surface_ && round >= kFirstSurfaceRound) {
+    ObserveSurface();
+  }
+  Solve(round < kPoseRounds);
+  last_move_mm_ = LargestMove(placed_.points, PlacedPoints(frame_, model_, field_, parameters_));
+  rounds_ = round + 1;
+}
+
+double Rms(const Eigen::MatrixXd& rows) {
+  return rows.size() == 0 ? 0 : std::sqrt(rows.rowwise().squaredNorm().mean());
+}
+
+// Computes sigma and the drawn shapes.
+void ShapeEstimator::ComputeSpread(const RunContext& context, ShapeEstimate& result) const {
+  std::vector<ShapeRow> rows;
+  for (int v = 0; v < static_cast<int>(model_.mean.points.size()); ++v) {
+    rows.push_back(VertexRow(model_, field_, v));
+  }
+  const ShapePosterior posterior =
+      MakePosterior(frame_, parameters_, seen_, prior_, options_.surface_length_mm);
+  result.sigma_mm =
+      DeviationsAlong(frame_, parameters_, posterior, rows, normals_, context.threads);
+  for (std::size_t v = 0; v < result.sigma_mm.size(); ++v) {
+    const double unseen_mm = UnseenSd_mm(model_.mean.points[v], seen_, options_);
+    result.sigma_mm[v] = std::hypot(result.sigma_mm[v], options_.discrepancy_mm, unseen_mm);
+  }
+  for (const std::uint64_t random_seed : target_.draws) {
+    result.drawn.push_back(
+        PlacedPoints(frame_, model_, field_, DrawParameters(parameters_, posterior, random_seed)));
+  }
+}
+
+ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
+  Place();
+  ShapeEstimate result;
+  result.subject_from_model = MakeSimilarity(frame_, parameters_);
+  result.coefficients = parameters_.coefficients;
+  result.points = placed_.points;
+  if (target_.compute_spread) {
+    ComputeSpread(context, result);
+  }
+  for (const ShapeTip& tip : target_.tips) {
+    result.tip_residual_mm.push_back(
+        (tip.position - PositionOf(tip.at, model_.mean, placed_.points))
+            .dot(NormalAt(tip.at, model_.mean, normals_)));
+  }
+  for (const ShapeMark& mark : target_.marks) {
+    Vec3 at = Vec3::Zero();
+    for (const ModelPoint& point : mark.at) {
+      at += PositionOf(point, model_.mean, placed_.points) / static_cast<double>(mark.at.size());
+    }
+    result.mark_residual_mm.push_back((mark.position - at).dot(mark.direction));
+  }
+  result.field_rms_mm = Rms(
+      field_ *
+      Eigen::Map<const Eigen::Matrix3Xd>(parameters_.field.data(), 3, field_.cols()).transpose());
+  result.surface_points = surface_points_;
+  result.rounds = rounds_;
+  result.last_move_mm = last_move_mm_;
+  result.usable = usable_;
+  return result;
+}
+
+}  // namespace
+
+ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,
+                            const ShapeFitOptions& options, const RunContext& context) {
+  CheckShapeModel(model, "shape model");
+  CheckTips(model, target);
+  ShapeEstimator estimator(model, target, options);
+  for (int round = 0; round < options.rounds && !estimator.HasConverged(round); ++round) {
+    context.ThrowIfStopped();
+    context.Report("shape", fmt::format("round {} of at most {}", round + 1, options.rounds));
+    estimator.Round(round);
+  }
+  return estimator.Result(context);
+}
+
+}  // namespace semblance

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Reads a volume from any supported file or folder.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "problems/io/volumes/ct_volume.h"
+#include "problems/io/volumes/itk_files.h"
+#include "surfaces/base/run_context.h"
+
+namespace semblance {
+
+struct ReadVolumeOptions {
+  std::string series;        // UID or number in a DICOM folder; empty if there is only one series
+  bool fill_slices = false;  // interpolates missing slices, and uses the first of doubled slices
+};
+
+// The kind of values; kUnknown if the file does not state it, then Hounsfield units are expected.
+enum class Modality { kUnknown, kCt, kMr };
+
+struct VolumeReading {
+  CtVolume volume;
+  Modality modality = Modality::kUnknown;
+  std::vector<std::string> notes;  // for people: how the volume was read, a line each
+};
+
+// Reads a folder of DICOM files (with its sub-folders), NIfTI (.nii, .nii.gz), NRRD (.nrrd, .nhdr),
+// MetaImage (.mha, .mhd) or an InVesalius project (.inv3). DICOM slices are sorted along their
+// normal; those of a tilted gantry make skew axes, and nothing is resampled. ITK and GDCM read in a
+// child process, because some damaged files make them end the process. Throws IoError or InputError
+// with one line for what cannot be used, and with a line for each series if several match. Throws
+// Cancelled soon after a stop is requested.
+VolumeReading ReadVolume(const std::filesystem::path& path, const ReadVolumeOptions& options,
+                         const RunContext& context);
+
+// The format of a file with a whole volume, by the ending of its name; empty for other endings.
+std::optional<VolumeFormat> FindVolumeFormat(const std::filesystem::path& file);
+
+// The files that ReadVolume reads: the path itself, or all files below the folder, sorted.
+std::vector<std::filesystem::path> VolumeFiles(const std::filesystem::path& path);
+
+}  // namespace semblance

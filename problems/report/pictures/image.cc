@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/report/pictures/image.h"
+
+#include <fmt/format.h>
+#include <png.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "problems/io/output_folder.h"
+#include "surfaces/base/error.h"
+
+namespace semblance {
+namespace {
+
+std::uint8_t Byte(double value) {
+  return static_cast<std::uint8_t>(std::lround(255 * std::clamp(value, 0.0, 1.0)));
+}
+
+std::size_t Offset(const Image& image, int x, int y) {
+  return 3 * (static_cast<std::size_t>(y) * image.width + x);
+}
+
+// Called by libpng. The string has reserved enough memory.
+void AppendBytes(png_structp png, png_bytep data, png_size_t size) {
+  static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<char*>(data), size);
+}
+
+void Flush(png_structp) {}
+
+// Two of libpng's five filters: all five take 1.5 times as long and save no bytes. libpng reports
+// errors by longjmp, so no object in this function has a destructor.
+bool WriteRows(png_structp png, png_infop info, const Image& image, PngEffort effort) {
+  const bool quick = effort == PngEffort::kQuick;
+  if (setjmp(png_jmpbuf(png)) != 0) {
+    return false;
+  }
+  png_set_IHDR(png, info, static_cast<png_uint_32>(image.width),
+               static_cast<png_uint_32>(image.height), 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, quick ? PNG_FILTER_UP : PNG_FILTER_SUB | PNG_FILTER_UP);
+  png_set_compression_level(png, quick ? 2 : 4);
+  png_write_info(png, info);
+  for (int row = 0; row < image.height; ++row) {
+    png_write_row(png, &image.rgb[3 * static_cast<std::size_t>(row) * image.width]);
+  }
+  png_write_end(png, info);
+  return true;
+}
+
+// Returns false if libpng runs out of memory.
+bool WritePng(const Image& image, PngEffort effort, std::string& bytes) {
+  png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
+  png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
+  if (info != nullptr) {
+    png_set_write_fn(png, &bytes, AppendBytes, Flush);
+  }
+  const bool written = info != nullptr && WriteRows(png, info, image, effort);
+  png_destroy_write_struct(&png, &info);
+  return written;
+}
+
+bool IsInside(const Image& image, int x, int y) {
+  return x >= 0 && y >= 0 && x < image.width && y < image.height;
+}
+
+}  // namespace
+
+Colour HexColour(std::uint32_t rrggbb) {
+  return {((rrggbb >> 16) & 255) / 255.0, ((rrggbb >> 8) & 255) / 255.0, (rrggbb & 255) / 255.0};
+}
+
+std::string HexText(const Colour& colour) {
+  const auto byte = [](double x) { return std::lround(255 * std::clamp(x, 0.0, 1.0)); };
+  return fmt::format("#{:02x}{:02x}{:02x}", byte(colour.r), byte(colour.g), byte(colour.b));
+}
+
+Image MakeImage(int width, int height, const Colour& colour) {
+  if (width < 1 || height < 1) {
+    throw InputError(
+        fmt::format("picture of {} x {} pixels: both sides must be at least 1", width, height));
+  }
+  Image image{.width = width, .height = height, .rgb = {}};
+  image.rgb.resize(Offset(image, 0, height));
+  FillRectangle(image, 0, 0, width, height, colour);
+  return image;
+}
+
+void BlendPixel(Image& image, int x, int y, const Colour& colour, double coverage) {
+  if (!IsInside(image, x, y) || !(coverage > 0)) {
+    return;
+  }
+  std::uint8_t* pixel = &image.rgb[Offset(image, x, y)];
+  const double c = std::min(coverage, 1.0);
+  pixel[0] = Byte((1 - c) * pixel[0] / 255 + c * colour.r);
+  pixel[1] = Byte((1 - c) * pixel[1] / 255 + c * colour.g);
+  pixel[2] = Byte((1 - c) * pixel[2] / 255 + c * colour.b);
+}
+
+void FillRectangle(Image& image, int x, int y, int width, int height, const Colour& colour) {
+  const std::uint8_t bytes[3] = {Byte(colour.r), Byte(colour.g), Byte(colour.b)};
+  const int left = std::max(x, 0), right = std::min(x + width, image.width);
+  const int top = std::max(y, 0), bottom = std::min(y + height, image.height);
+  if (left >= right || top >= bottom) {
+    return;
+  }
+  for (int column = left; column < right; ++column) {
+    std::copy_n(bytes, 3, &image.rgb[Offset(image, column, top)]);
+  }
+  for (int row = top + 1; row < bottom; ++row) {
+    std::copy_n(&image.rgb[Offset(image, left, top)], 3 * (right - left),
+                &image.rgb[Offset(image, left, row)]);
+  }
+}
+
+void Paste(Image& onto, const Image& picture, int x, int y) {
+  const int left = std::max(x, 0), right = std::min(x + picture.width, onto.width);
+  const int top = std::max(y, 0), bottom = std::min(y + picture.height, onto.height);
+  for (int row = top; row < bottom && left < right; ++row) {
+    std::copy_n(&picture.rgb[Offset(picture, left - x, row - y)], 3 * (right - left),
+                &onto.rgb[Offset(onto, left, row)]);
+  }
+}
+
+std::string EncodePng(const Image& image, PngEffort effort) {
+  if (image.width < 1 || image.height < 1 || image.rgb.size() != Offset(image, 0, image.height)) {
+    throw InputError(fmt::format("picture of {} x {} pixels with {} bytes: it has no valid pixels",
+                                 image.width, image.height, image.rgb.size()));
+  }
+  std::string bytes;
+  png_image largest{};
+  largest.width = static_cast<png_uint_32>(image.width);
+  largest.height = static_cast<png_uint_32>(image.height);
+  largest.format = PNG_FORMAT_RGB;
+  bytes.reserve(PNG_IMAGE_PNG_SIZE_MAX(largest));  // so that AppendBytes allocates nothing
+  if (!WritePng(image, effort, bytes)) {
+    throw InputError(fmt::format("picture of {} x {} pixels: libpng cannot write it", image.width,
+                                 image.height));
+  }
+  return bytes;
+}
+
+}  // namespace semblance
