@@ -19,7 +19,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/feature.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // One step at fraction 1 for every level of the steps, coarse to fine.
@@ -419,4 +419,4 @@ FitResult Fit(const HSplineSurface& start, const ScatteredPoints& points, const 
   return FitAlone(start, points, std::get<AutoPlan>(options.plan), context);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -10,7 +10,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Runs the steps of the plan. A plan that fits level by level solves for Net(level) as a plain
 // B-spline (FitLevel), and moves each vertex c to c + fraction (c' - c). Only the offsets of
@@ -37,4 +37,4 @@ FitResult Fit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
 FitResult Fit(const HSplineSurface& start, const ScatteredPoints& points, const FitOptions& options,
               const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

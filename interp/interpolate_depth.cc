@@ -5,7 +5,7 @@
 #include <ranges>
 #include <type_traits>
 
-namespace semblance {
+namespace semblance::interp {
 
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                             const RunContext& run) {
@@ -76,4 +76,4 @@ std::size_t FewestDowels(const DepthScheme& scheme) {
       scheme);
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

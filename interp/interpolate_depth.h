@@ -11,7 +11,7 @@
 #include "interp/stacking/auto_scheme.h"
 #include "interp/stacking/single_scheme.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // All choices: the single schemes, the mixture of several, and a map in place of a scheme.
 template <class... Single>
@@ -38,4 +38,4 @@ bool NeedsNetwork(const DepthScheme& scheme);
 // The smallest number of dowels at distinct places that the scheme needs; 1 for most schemes.
 std::size_t FewestDowels(const DepthScheme& scheme);
 
-}  // namespace semblance
+}  // namespace semblance::interp

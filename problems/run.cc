@@ -15,7 +15,7 @@
 #include "problems/face/hspline_prior.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Files = std::vector<std::filesystem::path>;
@@ -320,4 +320,4 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   return job.TakeResult();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "problems/face/hspline_prior.h"
 #include "surfaces/hspline_query/tessellate.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The mesh on which a face is measured has so many quads along each side of a patch of its finest
 // level.
@@ -69,4 +69,4 @@ struct RunResult {
 // OutOfMemory, Cancelled, and InputError if the face is not finite.
 RunResult Run(const Experiment& experiment, const RunContext& context, StageCache* cache = nullptr);
 
-}  // namespace semblance
+}  // namespace semblance::problems

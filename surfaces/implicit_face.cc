@@ -14,7 +14,7 @@
 #include "surfaces/implicit/trim_to_border.h"
 #include "surfaces/marching/edge_intersections.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // The emitting vertex of the shell that lies furthest along a direction; -1 if none emits.
@@ -255,4 +255,4 @@ ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> dep
   return face;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

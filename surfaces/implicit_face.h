@@ -15,7 +15,7 @@
 #include "surfaces/emitters/implicit_surface.h"
 #include "surfaces/implicit/polygonizer.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The face at the border of the skull: it goes around the rim, or it ends there too.
 enum class FaceEnds { kClosed, kOpen };
@@ -94,4 +94,4 @@ ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> dep
 // InputError for an empty mesh.
 TriMesh KeepOutermost(const TriMesh& mesh, int& dropped);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 #include "fitting/folds/turned_samples.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Bounds the time, which grows with the square of the number of means.
@@ -318,4 +318,4 @@ MapFaults FaultsBeyondNoise(const PlaneMap& map, std::span<const Triangle> trian
   return sum.Faults();
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Shares of the surface, 0 to 1.
 struct MapFaults {
@@ -41,4 +41,4 @@ MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> trian
 // narrow folds: near the edge of a fold it finds about half of the area.
 MapFaults FaultsBeyondNoise(const PlaneMap& map, std::span<const Triangle> triangles);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

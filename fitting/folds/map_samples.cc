@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <span>
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Indices of every n-th point.
@@ -105,4 +105,4 @@ SheetPlane PlaneAround(const std::vector<MapSample>& samples, const NearestSampl
   return plane;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -14,7 +14,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Positions and places are both in mm, so that lengths can be compared.
 struct PlaneMap {
@@ -84,4 +84,4 @@ struct SheetPlane {
 };
 SheetPlane PlaneAround(const std::vector<MapSample>& samples, const NearestSamples& nearest);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <numeric>
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 struct SheetSample {
@@ -151,4 +151,4 @@ TurnedSamples FindTurned(const std::vector<MapSample>& samples, double period_mm
   return found;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -6,7 +6,7 @@
 
 #include "fitting/folds/map_samples.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Shares, 0 to 1.
 struct TurnedSamples {
@@ -24,4 +24,4 @@ struct TurnedSamples {
 // they like. Fewer than 32 samples with a side give none that is turned.
 TurnedSamples FindTurned(const std::vector<MapSample>& samples, double period_mm);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // misfit / (1 - trace / count)^2, which is least where each point is best predicted by the others
 // (Craven & Wahba 1979). misfit: sum or mean of the squared residuals, negative only by round-off;
@@ -56,4 +56,4 @@ class TraceProbes {
   Eigen::MatrixXd directions_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

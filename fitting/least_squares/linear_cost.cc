@@ -7,7 +7,7 @@
 
 #include "fitting/least_squares/qr_compression.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The vertices with a non-zero column, each once, in their given order.
@@ -123,4 +123,4 @@ void ProblemSink::Add(std::shared_ptr<const Eigen::MatrixXd> a, Rows3 b,
   AddLinearResidual(std::move(a), std::move(b), vertices, nullptr, net_, problem_);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

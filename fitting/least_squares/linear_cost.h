@@ -13,7 +13,7 @@
 #include "fitting/least_squares/qr_compression.h"
 #include "surfaces/hspline/bspline.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Residual A X - B, row by row in the order x y z. X (vertices x 3) holds the control vertices in
 // mm, one parameter block of 3 doubles each; A is rows x vertices, scaled by its term; B is rows
@@ -67,4 +67,4 @@ class ProblemSink final : public RowSink {
   ceres::Problem& problem_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

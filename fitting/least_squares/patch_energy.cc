@@ -8,7 +8,7 @@
 #include <numbers>
 #include <numeric>
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using Gram = Eigen::Matrix4d;
@@ -99,7 +99,7 @@ HSplineShape PatchGrid::Shape() const {
 }
 
 Stencil PatchGrid::StencilAt(const Vec2& uv, DerivativeOrder order) const {
-  return semblance::StencilAt(Shape(), 0, uv, order);
+  return fitting::StencilAt(Shape(), 0, uv, order);
 }
 
 std::array<ElementStiffness, 6> BendingStiffnesses(double size_s, double size_t) {
@@ -268,4 +268,4 @@ double StretchBetween(const BendingMetric& one, const BendingMetric& other) {
   return half + std::sqrt(std::max(half * half - 1, 0.0));
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

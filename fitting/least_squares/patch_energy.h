@@ -11,7 +11,7 @@
 #include "surfaces/hspline/bspline.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The metric M of bending: a surface with the matrix H of second derivatives along (s,t) bends by
 // tr((M H)^2). M is symmetric, positive definite and of determinant 1. The identity gives the plain
@@ -55,7 +55,7 @@ struct PatchGrid {
   // The sixteen vertices of patch (i, j); that at column a, row b of its 4 x 4 has index a + 4 b.
   // A vertex appears several times if the grid is periodic with fewer than 4 patches along u.
   std::array<int, 16> PatchVertices(int i, int j) const;
-  // semblance::StencilAt on this grid; the vertices are PatchVertices of the patch at uv.
+  // fitting::StencilAt on this grid; the vertices are PatchVertices of the patch at uv.
   Stencil StencilAt(const Vec2& uv, DerivativeOrder order = {}) const;
 };
 
@@ -85,4 +85,4 @@ Vec2 MeanLengths(const PatchGrid& grid, const ControlNet& net);
 // The mean lengths of level 0.
 Vec2 MeanLengths(const HSplineSurface& surface);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 #include <limits>
 #include <utility>
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Rows; 128 x 19 doubles (19 kB) fit into the first-level cache.
@@ -78,4 +78,4 @@ void CompressShared(std::shared_ptr<const Eigen::MatrixXd>& a, Rows3& b) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 #include <memory>
 #include <span>
 
-namespace semblance {
+namespace semblance::fitting {
 
 using Rows3 = Eigen::Matrix<double, Eigen::Dynamic, 3, Eigen::RowMajor>;
 
@@ -36,4 +36,4 @@ LinearRows CompressRows(const Eigen::MatrixXd& a, const Rows3& b);
 // stays shared.
 void CompressShared(std::shared_ptr<const Eigen::MatrixXd>& a, Rows3& b);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

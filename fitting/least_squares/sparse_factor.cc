@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The pattern over vertices of a matrix over coordinates: a column per vertex, an entry per coupled
@@ -249,4 +249,4 @@ double SelectedInverse::At(int row, int column) const {
   return values_[static_cast<std::size_t>(found - rows_.begin())];
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -13,7 +13,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 using SparseMatrix = Eigen::SparseMatrix<double>;
 
@@ -172,4 +172,4 @@ class SelectedInverse {
   std::vector<double> values_;      // entries of the inverse
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

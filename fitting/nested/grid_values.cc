@@ -7,7 +7,7 @@
 #include "fitting/nested/lanes.h"
 #include "surfaces/base/simd.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Knot insertion (RefineRow): an odd vertex of the finer level lies on a coarser vertex, with
@@ -309,4 +309,4 @@ SEMBLANCE_WIDE void TurnOn(const GridRuns& runs, const GridStep& step, double fa
       });
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -11,7 +11,7 @@
 
 #include "fitting/least_squares/patch_energy.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The memory layout of a level's vertices: row by row, each row with kHalo additional places at
 // either end. For periodic u these hold copies of the columns across the seam; for open u they are
@@ -131,4 +131,4 @@ double AdvanceOn(const GridRuns& runs, const GridStep& step, double length);
 // direction = inverse * residual + factor * direction.
 void TurnOn(const GridRuns& runs, const GridStep& step, double factor);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 
 #include "surfaces/base/simd.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The function is always inlined, so the warning about returning a vector does not apply.
 #pragma GCC diagnostic push
@@ -35,4 +35,4 @@ SEMBLANCE_INLINE void WeightsAt(double t, double* weights) {
   std::memcpy(weights, &cubics, sizeof cubics);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

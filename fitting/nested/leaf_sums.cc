@@ -7,7 +7,7 @@
 #include "fitting/nested/lanes.h"
 #include "surfaces/base/simd.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The products of two of four weights, each pair once. The remaining places are zero and fill the
@@ -203,4 +203,4 @@ void ResidualsOver(const NestedPoints& points, const LeafPatch& leaf, const Leaf
   kCompute[points.channels - 1](MakeLeafPoints(points, leaf, indices), vertices, residuals);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 
 #include "fitting/nested/nested_points.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct LeafPatch {
   int level = -1, i = -1, j = -1;
@@ -41,4 +41,4 @@ using LeafVertices = std::array<std::array<double, 16>, 3>;
 void ResidualsOver(const NestedPoints& points, const LeafPatch& leaf, const LeafVertices& vertices,
                    std::span<const std::uint32_t> indices, NestedResidual* residuals);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

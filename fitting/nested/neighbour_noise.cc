@@ -9,7 +9,7 @@
 
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Finds the nearest points to a point among those before and after it along the curve.
@@ -122,4 +122,4 @@ PairCorrelation ClosestCorrelation(const NestedPoints& points,
   return pairs;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

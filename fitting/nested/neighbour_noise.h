@@ -7,7 +7,7 @@
 
 #include "fitting/nested/leaf_sums.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 enum class NeighbourModel { kPlaneOf8, kQuadraticOf20 };
 
@@ -38,4 +38,4 @@ PairCorrelation ClosestCorrelation(const NestedPoints& points,
                                    std::span<const std::uint32_t> indices,
                                    std::span<const NestedResidual> residuals);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -57,7 +57,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using Residual = NestedResidual;
@@ -766,4 +766,4 @@ NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& po
   return FitNested(start, DisplacementsFrom(start, points, context.threads), plan, context);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -14,7 +14,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct NestedRound {
   int finest = -1;                   // level
@@ -87,4 +87,4 @@ NestedFitResult FitNested(const HSplineSurface& start, NestedPoints points, cons
 void UpdateReport(const HSplineSurface& surface, const ScatteredPoints& points,
                   std::span<const double> residual_mm, int threads, AutoReport& report);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

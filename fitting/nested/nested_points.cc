@@ -10,7 +10,7 @@
 #include "fitting/space/point_cloud.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The shape with more than one level, so that CurveOrder sorts along a Z-curve.
@@ -187,4 +187,4 @@ std::vector<Vec2> UvAsGiven(NestedPoints points) {
   return std::move(points.uv);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

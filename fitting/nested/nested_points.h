@@ -13,7 +13,7 @@
 #include "fitting/problem/fit_target.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Points whose memory a fit may reuse.
 struct OwnedPoints {
@@ -96,4 +96,4 @@ inline std::array<int, 2> PatchOn(const PatchGrid& grid, int level, double x, do
           std::clamp(static_cast<int>(y * scale), 0, grid.patches_v - 1)};
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

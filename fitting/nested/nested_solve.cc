@@ -8,7 +8,7 @@
 
 #include "fitting/nested/lanes.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 constexpr int kMaxGradientSteps =
@@ -543,4 +543,4 @@ std::span<const NestedResidual> NestedResiduals::Of(std::size_t begin, std::size
   return some_;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

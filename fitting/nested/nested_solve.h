@@ -13,7 +13,7 @@
 #include "fitting/nested/nested_space.h"
 #include "fitting/nested/stencil_matrix.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 using NestedValues = std::vector<GridValues>;  // one per level
 
@@ -137,4 +137,4 @@ class NestedResiduals {
   std::vector<NestedResidual> some_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace semblance {
+namespace semblance::fitting {
 
 NestedSpace::NestedSpace(const HSplineShape& level0) {
   levels_.emplace_back().layout = {PatchGrid::Of(level0, 0)};
@@ -161,4 +161,4 @@ int NestedSpace::CountVertices() const {
   return count;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 #include "fitting/nested/grid_values.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct NestedLevel {
   GridLayout layout;
@@ -54,4 +54,4 @@ class NestedSpace {
   int vertices_ = 0;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The constants were chosen on the point sets of docs/fit.md, "How good it is".
@@ -414,4 +414,4 @@ int ReinstateStepPoints(const NestedPoints& points, const ResidualsBetween& resi
   return static_cast<int>(on_sheets.size());
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

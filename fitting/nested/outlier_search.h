@@ -10,7 +10,7 @@
 
 #include "fitting/nested/leaf_sums.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The standard deviation along one axis divided by the median of the distance, for normal errors
 // along 1, 2 and 3 axes (index 1 .. 3).
@@ -62,4 +62,4 @@ int FindOutliers(const NestedPoints& points, std::size_t every, const ResidualsB
 int ReinstateStepPoints(const NestedPoints& points, const ResidualsBetween& residuals,
                         const LeastSpread& least, std::vector<char>& outlier);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

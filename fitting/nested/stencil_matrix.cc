@@ -6,7 +6,7 @@
 
 #include "fitting/nested/lanes.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 constexpr int kBlock = GridLayout::kBlock;
@@ -176,4 +176,4 @@ void StencilMatrix::AddProduct(const GridValues& x, GridValues& y) const {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 
 #include "fitting/nested/grid_values.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // A symmetric matrix, stored by its 25 diagonals on and above the main one, separately for each run
 // of vertices, so that products run along the rows of the grid.
@@ -46,4 +46,4 @@ class StencilMatrix {
   std::vector<double> entries_;      // run by run, diagonal by diagonal
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "fitting/nested/lanes.h"
 #include "surfaces/base/simd.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Smallest statistic of detail: at 1 the gain of the functions equals their cost in variance.
@@ -274,4 +274,4 @@ int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
   return added;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

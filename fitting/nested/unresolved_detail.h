@@ -9,7 +9,7 @@
 #include "fitting/nested/leaf_sums.h"
 #include "fitting/nested/nested_space.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The test statistic for the functions N (B-splines) of a level and residuals e is
 //
@@ -42,4 +42,4 @@ int OverlayDetail(const UnresolvedDetail& detail, NestedSpace& space);
 int OverlayDense(const NestedPoints& points, int level, double points_per_patch,
                  NestedSpace& space);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

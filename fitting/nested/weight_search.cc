@@ -8,7 +8,7 @@
 
 #include "fitting/least_squares/cross_validation.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The constants below trade solves (time) against a better score. They were chosen on the sets of
@@ -192,4 +192,4 @@ NestedWeight NestedWeightSearch::Finish() {
   return best_;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

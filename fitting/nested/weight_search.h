@@ -8,7 +8,7 @@
 
 #include "fitting/nested/nested_solve.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct NestedWeight {
   double weight = kNaN;
@@ -73,4 +73,4 @@ class NestedWeightSearch {
   int steps_ = 0;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

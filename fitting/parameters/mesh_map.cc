@@ -25,7 +25,7 @@
 #include "fitting/folds/fold_check.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 namespace layout = CGAL::Surface_mesh_parameterization;
@@ -257,4 +257,4 @@ MeshLayout LayOut(const TriMesh& mesh, MeshMap map) {
   return {.at = Places(mesh, halfedges, border, MeshMap::kMeanValue), .map = MeshMap::kMeanValue};
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -8,7 +8,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 enum class MeshMap { kAuto, kArap, kLscm, kMeanValue, kTutte };
 constexpr auto EnumNames(MeshMap) {
@@ -32,4 +32,4 @@ struct MeshLayout {
 // Throws InputError for any other mesh, with its fault and the remedy, and if the layout fails.
 MeshLayout LayOut(const TriMesh& mesh, MeshMap map);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

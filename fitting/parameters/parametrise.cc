@@ -11,7 +11,7 @@
 #include "fitting/parameters/point_map.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Largest share of the points that may fold or collapse. Outliers and noise reach a few permille.
@@ -288,4 +288,4 @@ Parametrisation Parametrise(std::span<const Vec3> positions, const Parameters& p
                      parameters);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

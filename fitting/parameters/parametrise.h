@@ -19,7 +19,7 @@
 #include "surfaces/hspline/hspline_shape.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The treatment of points that fold over a plane or a cylinder.
 enum class FoldRule { kRefuse, kAccept };
@@ -145,4 +145,4 @@ Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},
                             std::span<const Vec2> given_uv = {});
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -14,7 +14,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 [[noreturn]] void FailMap(const std::string& what) { throw InputError("parameters: " + what); }
@@ -221,4 +221,4 @@ bool CylinderEnds::Close() const {
   return narrower_mm < kNarrow * all_mm;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // An axis with two directions across it; the three are orthonormal and right-handed.
 struct CylinderAxis {
@@ -61,4 +61,4 @@ struct CylinderEnds {
 };
 CylinderEnds FindEnds(std::span<const Vec3> points, const CylinderAxis& axis);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 
 #include "fitting/nested/nested_fit.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 LevelSummary Summarise(const NestedRound& round) {
@@ -56,4 +56,4 @@ FitResult FitAlone(const HSplineSurface& start, OwnedPoints points, const AutoPl
                               plan, context));
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -8,7 +8,7 @@
 #include "fitting/problem/fit_target.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Returns whether the options need nothing else: plan auto with the solver `fastest`.
 bool IsAlone(const FitOptions& options);
@@ -21,4 +21,4 @@ FitResult FitAlone(const HSplineSurface& start, const ScatteredPoints& points, c
 FitResult FitAlone(const HSplineSurface& start, OwnedPoints points, const AutoPlan& plan,
                    const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

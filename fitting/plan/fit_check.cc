@@ -11,7 +11,7 @@
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 [[noreturn]] void Fail(const std::string& what) { throw InputError("fit: " + what); }
@@ -302,4 +302,4 @@ void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

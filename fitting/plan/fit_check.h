@@ -10,7 +10,7 @@
 #include "fitting/problem/fit_target.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct FitFault {
   std::string path;  // of the option within those of the fit, such as plan.schedule[1].level
@@ -35,4 +35,4 @@ void CheckFit(const HSplineSurface& start, const HSplineSurface& rest, const Fit
 void CheckFit(const HSplineSurface& start, const ScatteredPoints& points,
               const FitOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

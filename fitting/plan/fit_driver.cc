@@ -15,7 +15,7 @@
 #include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using WeightAndDistance = std::array<double, 2>;
@@ -255,4 +255,4 @@ void FitDriver::MeasurePoints(bool known) {
   result_.dowel_rms_mm = seeded ? WeightedRms(std::move(dowels)) : result_.point_rms_mm;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -14,7 +14,7 @@
 #include "fitting/terms/level_view.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Returns the weighted RMS distance of the points from the surface at their (u,v); NaN without
 // points. The sum does not depend on the order of the points.
@@ -78,4 +78,4 @@ class FitDriver {
   std::optional<DowelMesh> mesh_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "fitting/relaxation/relaxation.h"
 #include "fitting/terms/term.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct FitOptions {
   SchedulePlan plan = ListedPlan{};
@@ -56,4 +56,4 @@ void Fields(Visitor& visit, FitOptions& o) {
       o.solver);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace semblance {
+namespace semblance::fitting {
 
 std::vector<std::string> FaultsIn(const FitResult& fit) {
   if (fit.usable) {
@@ -26,4 +26,4 @@ std::vector<std::string> FaultsIn(const FitResult& fit) {
   return faults.empty() ? std::vector<std::string>{"the fit was not done"} : faults;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -11,7 +11,7 @@
 #include "fitting/solve/level_summary.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct FitResult {
   HSplineSurface surface;
@@ -30,4 +30,4 @@ struct FitResult {
 // Returns the reasons why the result cannot be used, one line each; empty if it can be used.
 std::vector<std::string> FaultsIn(const FitResult& fit);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

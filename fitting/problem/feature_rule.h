@@ -8,7 +8,7 @@
 
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The features' offsets are fitted like all others. After the fit they get back the template's
 // offsets (thesis 4.3).
@@ -51,4 +51,4 @@ void Fields(Visitor&, FrozenFeatures&) {}
 
 using FeatureRule = std::variant<RestoreFeatures, FreeFeatures, WeightedFeatures, FrozenFeatures>;
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace semblance {
+namespace semblance::fitting {
 
 std::vector<ScheduleStep> PlanSteps(const SchedulePlan& plan) {
   std::vector<ScheduleStep> steps;
@@ -49,4 +49,4 @@ int FinestAllowed(const SchedulePlan& plan, const HSplineShape& shape) {
   return std::max(finest, shape.max_level);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -11,7 +11,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_shape.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // One step of the fit (thesis 4.2): a level is fitted by least squares, and every control vertex c
 // moves the given fraction of the way to its solution c', to c + fraction (c' - c).
@@ -261,4 +261,4 @@ int FinestPlanLevel(const SchedulePlan& plan);
 // lowered until the level has at most kMaxPatches patches along each side.
 int FinestAllowed(const SchedulePlan& plan, const HSplineShape& shape);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -8,7 +8,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 bool InDomain(const Vec2& uv) { return (uv.array() >= 0).all() && (uv.array() <= 1).all(); }
@@ -97,4 +97,4 @@ void CheckPoints(const ScatteredPoints& points) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

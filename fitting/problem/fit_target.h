@@ -10,7 +10,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/point_role.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct FitPoint {
   std::string label;                     // dowel's site or seed's patch; for reports
@@ -76,4 +76,4 @@ void CheckTarget(const FitTarget& target);
 // Checks positions, (u,v) and weights like CheckTarget, and that their numbers agree.
 void CheckPoints(const ScatteredPoints& points);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -13,7 +13,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Weighted means of both point sets, and second moments about the means.
@@ -138,4 +138,4 @@ HSplineSurface Transformed(const HSplineSurface& surface, const Similarity& to_f
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -8,7 +8,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The thesis (4.2) translates and scales the template by hand. We also rotate it, because skulls
 // are scanned in any pose.
@@ -45,4 +45,4 @@ Similarity PlaceTemplate(std::span<const Vec3> on_template, std::span<const Vec3
 // level 0 are mapped, and offsets are scaled; offsets in world axes are also rotated.
 HSplineSurface Transformed(const HSplineSurface& surface, const Similarity& to_from);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

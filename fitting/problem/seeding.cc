@@ -11,7 +11,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 struct Patches {
@@ -215,4 +215,4 @@ SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -15,7 +15,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // kRay takes the nearest point along a direction, forwards or backwards, whose triangle faces along
 // it. kClosest takes the nearest point of the mesh. Rays spread the seeds evenly even over
@@ -88,4 +88,4 @@ SeedResult SeedDowels(const HSplineSurface& placed, const MeshQuery& implicit,
                       const TriMesh& implicit_mesh, std::span<const Sphere> masks,
                       const SeedOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

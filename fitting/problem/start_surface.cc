@@ -10,7 +10,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 Vec3 Around(double turns) {
@@ -69,4 +69,4 @@ HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> pos
                                                : FitNet(OpenFunctions, shape, positions, uv));
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Makes a smooth surface near the points, with level 0 alone. It is the least-squares fit by linear
 // combinations of
@@ -18,4 +18,4 @@ namespace semblance {
 HSplineSurface StartSurface(const HSplineShape& shape, std::span<const Vec3> positions,
                             std::span<const Vec2> uv);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

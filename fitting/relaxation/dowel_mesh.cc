@@ -15,7 +15,7 @@
 
 #include "fitting/least_squares/patch_energy.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -99,4 +99,4 @@ double SharpestCrease_deg(const HSplineSurface& surface, const DowelMesh& mesh,
   return std::acos(std::max(cosine, -1.0)) * 180 / std::numbers::pi;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

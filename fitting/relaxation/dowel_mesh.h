@@ -9,7 +9,7 @@
 #include "fitting/problem/fit_target.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 enum class DowelLinks { kDelaunay, kNone };
 
@@ -48,4 +48,4 @@ class DowelMesh {
 double SharpestCrease_deg(const HSplineSurface& surface, const DowelMesh& mesh,
                           std::span<const Vec2> uv);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

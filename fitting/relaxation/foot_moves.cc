@@ -14,7 +14,7 @@
 #include "surfaces/hspline_query/hspline_batch.h"
 #include "surfaces/hspline_query/hspline_project.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 constexpr int kFinestLevel = 2;     // of the coarse fit; finer levels cost more and change little
@@ -211,4 +211,4 @@ int KeepFromFolding(const HSplineShape& shape, std::span<const Triangle> triangl
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

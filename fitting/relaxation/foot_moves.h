@@ -12,7 +12,7 @@
 #include "surfaces/hspline/hspline_shape.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Statistics of the moves. Root mean squares are over the points that are outliers neither of the
 // first nor of the last surface.
@@ -49,4 +49,4 @@ MovedUv MoveToFeet(const HSplineShape& shape, const ScatteredPoints& points,
 int KeepFromFolding(const HSplineShape& shape, std::span<const Triangle> triangles,
                     std::span<const Vec2> from, std::span<Vec2> to);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

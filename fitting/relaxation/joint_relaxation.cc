@@ -20,7 +20,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/bspline.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 constexpr int kSteps = 5;        // of Levenberg-Marquardt; the next round starts from a new patch
@@ -371,4 +371,4 @@ RelaxationSummary RelaxJointly(const HSplineSurface& surface, const HSplineSurfa
   return summary;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "fitting/relaxation/relaxation.h"
 #include "fitting/solve/space_solve.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The level of the fit.
 struct JointLevel {
@@ -35,4 +35,4 @@ RelaxationSummary RelaxJointly(const HSplineSurface& surface, const HSplineSurfa
                                const DowelMesh& mesh, const NetworkMoves& moves,
                                const JointLevel& level, FitTarget& target);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -41,7 +41,7 @@
 #include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/relaxer.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 namespace {
 
@@ -354,4 +354,4 @@ RelaxationSummary Relax(const HSplineSurface& surface, const HSplineSurface& res
   return summary;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -14,7 +14,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 class DowelMesh;  // dowel_mesh.h
 
@@ -179,4 +179,4 @@ RelaxationSummary Relax(const HSplineSurface& surface, const HSplineSurface& res
                         const DowelMesh& mesh, const NetworkMoves& moves, FitTarget& target,
                         const MeasuredPenalties& measured = {});
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/relaxation.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // A place on the surface.
 struct SurfaceSample {
@@ -100,4 +100,4 @@ class Relaxer {
 void MovePoints(const HSplineSurface& surface, const std::vector<Vec2>& uv, FitTarget& target,
                 RelaxationSummary& summary);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -21,7 +21,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 HSplineSurface EmptyLike(const HSplineSurface& surface) {
   HSplineShape shape = surface.shape();
@@ -309,4 +309,4 @@ AttributeFit FitAttributes(const HSplineSurface& surface, const AttributeColumns
   return fit;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

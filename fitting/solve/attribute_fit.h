@@ -10,7 +10,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Attributes of points as columns. The referenced arrays must outlive it.
 struct AttributeColumns {
@@ -49,4 +49,4 @@ struct AttributeFit {
 AttributeFit FitAttributes(const HSplineSurface& surface, const AttributeColumns& points,
                            std::span<const std::uint32_t> left_out, int threads);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

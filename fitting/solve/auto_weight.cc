@@ -11,7 +11,7 @@
 #include "fitting/least_squares/sparse_factor.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Probes of the trace's estimate: time against accuracy. The decade needs a rough score only.
@@ -158,4 +158,4 @@ void SetWeight(double weight, Term& term) {
       term);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 #include "fitting/solve/space_system.h"
 #include "fitting/terms/term.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The least-squares problem |e - A d|^2 + |fixed terms|^2 + lambda |smoothness|^2 in steps d from
 // the present surface, for each coordinate.
@@ -43,4 +43,4 @@ double WeightAsWritten(std::span<const Term> terms, double length_mm);
 // Sets the weight of a smoothness or membrane term. Other terms stay unchanged.
 void SetWeight(double weight, Term& term);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

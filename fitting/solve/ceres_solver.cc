@@ -22,7 +22,7 @@
 #include "fitting/terms/term_cost.h"
 #include "surfaces/base/lower_case.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 constexpr int kMaxIterations = 50;        // determined directions need two or three
@@ -482,4 +482,4 @@ SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, C
   return outcome;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -8,7 +8,7 @@
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct SolverOutcome {
   int iterations = 0;
@@ -36,4 +36,4 @@ double ProximalShift(std::span<const Term> terms, std::size_t vertices);
 // minimiser is that of SolveByCeres, which makes a factor in each step.
 SolverOutcome SolveCoupled(const LevelView& view, std::span<const Term> terms, ControlNet& net);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

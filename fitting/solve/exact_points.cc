@@ -8,7 +8,7 @@
 
 #include "fitting/space/hierarchical_spline_space.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 constexpr DerivativeOrder kPlace = {0, 0}, kAlongU = {1, 0}, kAlongV = {0, 1};
@@ -123,4 +123,4 @@ std::vector<double> ExactEquations::Misses(const ControlNet& values) const {
   return misses;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -10,7 +10,7 @@
 #include "fitting/problem/fit_target.h"
 #include "fitting/space/hierarchical_spline_space.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The equations of exact points: three for a position, and two more for a normal, which must be
 // perpendicular to the tangents along u and v. The space must not be edited while this object is in
@@ -57,4 +57,4 @@ class ExactEquations {
   int points_ = 0;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

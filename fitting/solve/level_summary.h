@@ -7,7 +7,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Selects whether a solve also measures term costs, coverage and rank. Measuring takes a good part
 // of a round, so only the last of several rounds makes a full report.
@@ -45,4 +45,4 @@ struct LevelSummary {
   bool usable = false;  // false: the solver failed and the net is unchanged
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -6,7 +6,7 @@
 #include <set>
 #include <tuple>
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The vertices of the next level on the knots of a patch that are not edited. At a border, and with
@@ -128,4 +128,4 @@ std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
   return {finer.begin(), finer.end()};
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

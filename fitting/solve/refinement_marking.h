@@ -18,7 +18,7 @@
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/space/hierarchical_spline_space.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Marks vertices over each leaf with a point farther away than the plan's tolerance, and over each
 // leaf with one of `places`. They are the missing vertices over the leaf's coarsest ancestor (or
@@ -32,4 +32,4 @@ std::vector<VertexId> MarkForRefinement(const HierarchicalSplineSpace& space,
                                         std::span<const double> squares,
                                         std::span<const Vec2> places = {});
 
-}  // namespace semblance
+}  // namespace semblance::fitting

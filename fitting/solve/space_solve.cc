@@ -16,7 +16,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Limits of the iterations, which normally end by their tolerances. Steps converge at once or
@@ -694,4 +694,4 @@ PatchCoverage MakeCoverage(const std::vector<int>& counts) {
   return coverage;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

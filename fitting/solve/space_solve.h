@@ -55,7 +55,7 @@
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The accuracy of a solve: the last step moves the surface by less than 1e-4 of its size, or by
 // less than 1e-13 (1e-12 with a loss), which is round-off.
@@ -238,4 +238,4 @@ LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solve
 // Summarises the numbers of observations per patch.
 PatchCoverage MakeCoverage(const std::vector<int>& counts);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 #include "fitting/least_squares/sparse_factor.h"
 #include "fitting/terms/term_cost.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The contributions of a patch and all of its descendants, in the basis of the patch's sixteen
@@ -242,4 +242,4 @@ void AddTermRows(std::span<const Term> terms, const LevelView& view, const Contr
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -10,7 +10,7 @@
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Normal equations for a step from the present surface; x, y and z share the matrix.
 struct NormalSystem {
@@ -45,4 +45,4 @@ NormalSystem Assemble(const HierarchicalSplineSpace& space, double point_scale,
 void AddTermRows(std::span<const Term> terms, const LevelView& view, const ControlNet& net,
                  SystemPart part, NormalSystem& system);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -13,7 +13,7 @@
 #include "fitting/space/point_cloud.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 std::vector<Observation> UsedPoints(const AttributeColumns& points,
@@ -183,4 +183,4 @@ std::vector<double> SurfaceSigma::At(std::span<const Vec2> uv) const {
 
 double SurfaceSigma::degrees_of_freedom() const { return model_->determined; }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

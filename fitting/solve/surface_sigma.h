@@ -11,7 +11,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The parameters of the fit.
 struct SigmaOptions {
@@ -58,4 +58,4 @@ class SurfaceSigma {
   std::unique_ptr<const Model> model_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Returns whether a leaf has so few points that summing point by point is faster than by moments.
@@ -409,4 +409,4 @@ SplineElements::SplineElements(const HierarchicalSplineSpace& space)
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -50,7 +50,7 @@
 #include "fitting/space/patch_moments.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // A degree of freedom: the position of a vertex of level 0, or the displacement of an edited vertex
 // from its place on the refined coarser net.
@@ -175,4 +175,4 @@ class SplineElements {
   std::vector<VertexId> vertices_;  // per unknown
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -7,7 +7,7 @@
 #include "surfaces/base/simd.h"
 #include "surfaces/hspline/bspline.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using Vec4 = double __attribute__((vector_size(32)));
@@ -232,4 +232,4 @@ const Matrix16& RefinementMatrix(int right, int upper) {
   return matrices[right + 2 * upper];
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

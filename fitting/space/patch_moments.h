@@ -11,7 +11,7 @@
 #include "fitting/least_squares/patch_energy.h"
 #include "fitting/space/point_cloud.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 using PatchMatrix = Eigen::Matrix<double, 16, 3>;  // sixteen vertices' x, y, z
 
@@ -61,4 +61,4 @@ PatchMatrix ResidualOfPoints(const PatchMoments& sums);
 // RefinePatch.
 const Matrix16& RefinementMatrix(int right, int upper);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

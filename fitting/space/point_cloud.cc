@@ -7,7 +7,7 @@
 #include <numeric>
 #include <tuple>
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Bits of the place in a level-0 patch, along each side. A key has 2 * 18 of them and 28 bits for
@@ -227,4 +227,4 @@ PointCloud::Range PointCloud::Child(const Range& parent, const PatchId& child) c
   return {at(order), at(order + 1)};
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

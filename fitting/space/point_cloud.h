@@ -11,7 +11,7 @@
 #include "fitting/problem/fit_target.h"
 #include "surfaces/hspline/hspline_shape.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // A point that a surface should meet: S(uv) should equal `position`.
 struct Observation {
@@ -69,4 +69,4 @@ class PointCloud {
   double weight_sum_ = 0;
 };
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "fitting/least_squares/qr_compression.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // The whole point, before the detail of finer levels is taken off.
@@ -214,4 +214,4 @@ LevelView MakeSpaceView(const HierarchicalSplineSpace& space, const PointCloud& 
   return view;
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -16,7 +16,7 @@
 #include "surfaces/hspline/bspline.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // A point with a known foot on the bone. The detail that finer levels add is taken off both.
 struct BoneObservation {
@@ -103,4 +103,4 @@ void SortObservations(const PointCloud& cloud, std::vector<Observation>& observa
 LevelView MakeSpaceView(const HierarchicalSplineSpace& space, const PointCloud& cloud,
                         const FitTarget& target, const Vec2& lengths_mm);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace semblance {
+namespace semblance::fitting {
 
 MetricDistortion MeasureDistortion(const HSplineSurface& surface, const HSplineSurface& rest,
                                    const std::function<bool(const Vec3&)>& wanted) {
@@ -34,4 +34,4 @@ MetricDistortion MeasureDistortion(const HSplineSurface& surface, const HSplineS
           .area_cm2 = area / (4.0 * columns * rows) / 100};
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

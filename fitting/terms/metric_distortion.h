@@ -10,7 +10,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The k-th of the 2 x 2 Gauss points of each of columns x rows patches, k = 0 .. 4 columns rows
 // - 1. The four points of a patch have consecutive numbers.
@@ -71,4 +71,4 @@ struct MetricDistortion {
 MetricDistortion MeasureDistortion(const HSplineSurface& surface, const HSplineSurface& rest,
                                    const std::function<bool(const Vec3&)>& wanted);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -12,7 +12,7 @@
 #include "fitting/least_squares/qr_compression.h"
 #include "fitting/terms/term_cost.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // A loss applies to each point separately, so points with a loss are not compressed.
@@ -251,4 +251,4 @@ double TermCost(const SpringTerm& term, const LevelView& view, const ControlNet&
   return BoneSum(term, view, net);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -13,7 +13,7 @@
 #include "fitting/terms/metric_distortion.h"
 #include "fitting/terms/term_cost.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 const ControlNet& Anchor(const PriorTerm& term, const LevelView& view) {
@@ -414,4 +414,4 @@ double TermCost(const DistortionTerm& term, const LevelView& view, const Control
   return samples.empty() ? 0 : scale * sum / AreaSum(samples);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -10,7 +10,7 @@
 #include "fitting/least_squares/qr_compression.h"
 #include "fitting/terms/term_cost.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Points of one element that are summed together. It bounds memory: 19 MB as rows of 48 columns.
@@ -195,4 +195,4 @@ double TermCost(const TangentPointTerm& term, const LevelView& view, const Contr
   return view.observations.empty() ? 0 : term.weight * sum / view.WeightSum();
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

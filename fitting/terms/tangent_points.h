@@ -11,7 +11,7 @@
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 class TangentSums {
  public:
@@ -52,4 +52,4 @@ class TangentSums {
 // The unit normal of the surface before the solve; 0 where it has none.
 Vec3 NormalBefore(const LevelView& view, const Vec2& uv);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

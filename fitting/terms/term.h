@@ -16,7 +16,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_shape.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // The option `weight` of a term, in 0 .. 1e6.
 template <class Visitor>
@@ -321,4 +321,4 @@ inline double WeightOf(const Term& term) {
   return std::visit([](const auto& t) -> double { return t.weight; }, term);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

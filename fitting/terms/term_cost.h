@@ -17,7 +17,7 @@
 #include "fitting/terms/level_view.h"
 #include "fitting/terms/term.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 // Adds the rows of a term that treats x, y and z alike. The sum of their squares equals TermCost.
 // The rows of a PointTerm ignore its loss.
@@ -164,4 +164,4 @@ double TermCost(const NonPenetrationTerm& term, const LevelView& view, const Con
 double TermCost(const SpringTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const DistortionTerm& term, const LevelView& view, const ControlNet& net);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -18,7 +18,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 constexpr Eigen::Index kAtOnce = 64;  // right-hand sides per solve; bounds the memory
@@ -386,4 +386,4 @@ Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd left, double share) {
   return root.leftCols(rank);
 }
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -14,7 +14,7 @@
 #include "fitting/terms/term.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::fitting {
 
 struct PointErrors {
   std::vector<Vec3> directions;  // unit, one per point: the direction of its error
@@ -73,4 +73,4 @@ class ErrorPropagation {
 // & Schneider 2012).
 Eigen::MatrixXd PivotedRoot(Eigen::MatrixXd covariance, double share = 1e-3);
 
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kUnitTolerance = 1e-6;
@@ -103,4 +103,4 @@ bool Faces(const Vec3& normal, const Vec3& direction, double max_angle_deg) {
          normal.dot(direction) > std::cos(max_angle_deg * std::numbers::pi / 180);
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

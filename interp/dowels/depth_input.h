@@ -17,7 +17,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class DepthStatus : std::uint8_t {
   kAssigned,   // the scheme assigned a depth
@@ -89,4 +89,4 @@ void MaxAngleField(Visitor& visit, double& max_angle_deg) {
         max_angle_deg);
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/dowels/dowel.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 Side SideOfSite(std::string_view site) {
   if (site.size() <= 2) {
@@ -14,4 +14,4 @@ std::string WithoutSide(std::string_view site) {
   const std::size_t suffix = SideOfSite(site) == Side::kMidline ? 0 : 2;
   return std::string(site.substr(0, site.size() - suffix));
 }
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/point_role.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 struct Dowel {
   std::string site;                       // landmark code with side, e.g. "g", "go_l", "go_r"
@@ -33,4 +33,4 @@ Side SideOfSite(std::string_view site);
 // The site code without its side: "go" for "go_l", "go_r" and "go".
 std::string WithoutSide(std::string_view site);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 // Relative tolerance against round-off. A vertex on a shared cutting plane must belong to one of
@@ -157,4 +157,4 @@ DepthField AssignInAreas(const std::vector<DowelArea>& areas, AreaDistance dista
   return field;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 
 #include "interp/dowels/depth_input.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class AreaDistance { kPlane, kTriangle };
 constexpr auto EnumNames(AreaDistance) {
@@ -68,4 +68,4 @@ DepthField AssignInAreas(const std::vector<DowelArea>& areas, AreaDistance dista
                          double max_angle_deg, const DepthInput& input, const RunContext& run,
                          const std::function<double(const AreaPoint&, const Vec3&)>& depth_at);
 
-}  // namespace semblance
+}  // namespace semblance::interp

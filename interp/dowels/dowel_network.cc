@@ -15,7 +15,7 @@
 #include "interp/dowels/dowel_area.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 std::map<std::string, int> IndexBySite(std::span<const Dowel> dowels) {
@@ -298,4 +298,4 @@ ShownDowels LeaveOutDowels(std::span<const Dowel> dowels, const DowelNetwork& ne
   return shown;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

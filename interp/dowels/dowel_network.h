@@ -11,7 +11,7 @@
 
 #include "interp/dowels/dowel.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // A network given by site names, as published or as in a file. It is valid for every subject.
 struct NetworkPlan {
@@ -61,4 +61,4 @@ struct ShownDowels {
 ShownDowels LeaveOutDowels(std::span<const Dowel> dowels, const DowelNetwork& network,
                            const std::vector<std::size_t>& fold);
 
-}  // namespace semblance
+}  // namespace semblance::interp

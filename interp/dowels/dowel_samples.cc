@@ -11,7 +11,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kMinDepthShare = 0.1;  // of the smallest depth, without clamp; any small positive
@@ -132,4 +132,4 @@ SampleFrame FindSampleFrame(const std::vector<DepthSample>& samples) {
   return frame;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 
 #include "interp/dowels/depth_input.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // Points closer than this count as one point. A vertex this close to a base gets the base's depth.
 inline constexpr double kSamePoint_mm = 1e-6;
@@ -71,4 +71,4 @@ struct SampleFrame {
 
 SampleFrame FindSampleFrame(const std::vector<DepthSample>& samples);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -14,7 +14,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 Interpolator AnyInterpolator(const DepthScheme& scheme) {
@@ -203,4 +203,4 @@ DepthField WithStatedSd(DepthField field, const CrossValidation& known, const De
   return field;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -14,7 +14,7 @@
 #include "interp/schemes/outside_rule.h"
 #include "interp/stacking/leave_out.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // One fold per landmark, with its left and right site (suffixes _l and _r) together, because a
 // left-out dowel could be predicted from its twin.
@@ -67,4 +67,4 @@ CrossValidation CrossValidate(const DepthScheme& scheme, const OutsideRule& rule
 DepthField WithStatedSd(DepthField field, const CrossValidation& known, const DepthInput& input,
                         const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -7,7 +7,7 @@
 
 #include "interp/dowels/dowel_area.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using CellKey = std::array<std::int32_t, 3>;
@@ -108,4 +108,4 @@ std::vector<Vec3> DepthDirections(const DepthDirection& direction, const DepthIn
                     direction);
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

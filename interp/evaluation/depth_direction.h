@@ -9,7 +9,7 @@
 
 #include "interp/dowels/depth_input.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // The mesh's normal at the vertex, which is as rough as the mesh.
 struct MeshNormal {
@@ -52,4 +52,4 @@ using DepthDirection = std::variant<MeshNormal, SmoothedNormal, DowelDirection>;
 std::vector<Vec3> DepthDirections(const DepthDirection& direction, const DepthInput& input,
                                   const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

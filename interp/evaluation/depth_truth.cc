@@ -11,7 +11,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 struct Measured {
@@ -102,4 +102,4 @@ DepthTruth MeasureDepthTruth(const TriMesh& skull, std::span<const Vec3> directi
   return truth;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

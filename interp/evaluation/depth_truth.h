@@ -10,7 +10,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 struct DepthTruthOptions {
   double max_depth_mm = 60;
@@ -62,4 +62,4 @@ DepthTruth MeasureDepthTruth(const TriMesh& skull, std::span<const Vec3> directi
                              const TriMesh& skin, const DepthTruthOptions& options,
                              const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -9,7 +9,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr int kLevels = 19;  // 5 % .. 95 %
@@ -169,4 +169,4 @@ DepthScores ScoreDepths(std::span<const double> errors, std::span<const double> 
   return scores;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

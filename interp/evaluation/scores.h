@@ -10,7 +10,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // The probability (0..1) of the smallest central interval of a normal distribution that contains
 // the error. With an sd of 0 it is 0 for an error of 0 (within 1e-9, for round-off) and otherwise
@@ -72,4 +72,4 @@ struct DepthScores {
 DepthScores ScoreDepths(std::span<const double> errors, std::span<const double> sds,
                         std::span<const double> weights = {});
 
-}  // namespace semblance
+}  // namespace semblance::interp

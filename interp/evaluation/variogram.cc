@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <limits>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr int kPoints = 1500;
@@ -145,4 +145,4 @@ VariogramModel FitVariogram(std::span<const VariogramBin> bins) {
   return best;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

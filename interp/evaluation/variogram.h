@@ -9,7 +9,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 struct VariogramBin {
   double distance_mm = kNaN;       // weighted mean over the bin's pairs
@@ -44,4 +44,4 @@ std::vector<VariogramBin> EmpiricalVariogram(std::span<const Vec3> points,
 // or if no bin is above 0.
 VariogramModel FitVariogram(std::span<const VariogramBin> bins);
 
-}  // namespace semblance
+}  // namespace semblance::interp

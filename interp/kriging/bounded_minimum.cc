@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr int kSteps = 8;  // grid cells per number
@@ -121,4 +121,4 @@ RangeEnd EndOfRange(const SearchRange& bounds, const SmoothCost& cost, const Eig
                                                           : RangeEnd::kNone;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

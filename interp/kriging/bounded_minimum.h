@@ -7,7 +7,7 @@
 
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 struct SearchRange {
   Eigen::VectorXd low, high;  // equal bounds fix a number
@@ -28,4 +28,4 @@ enum class RangeEnd { kNone, kLow, kHigh };
 RangeEnd EndOfRange(const SearchRange& bounds, const SmoothCost& cost, const Eigen::VectorXd& x,
                     Eigen::Index number);
 
-}  // namespace semblance
+}  // namespace semblance::interp

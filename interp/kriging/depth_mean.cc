@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kReliefEdge_mm = 3;  // mesh for the relief; well below the smaller scale
@@ -123,4 +123,4 @@ Eigen::MatrixXd MeanRegressors::AtVertices(const RunContext& run) const {
   return regressors;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

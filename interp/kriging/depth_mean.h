@@ -12,7 +12,7 @@
 #include "interp/dowels/depth_input.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class DepthMean { kConstant, kTable, kCovariates, kGeometry };
 constexpr auto EnumNames(DepthMean) {
@@ -126,4 +126,4 @@ void StateSdField(Visitor& visit, bool& state_sd) {
       state_sd);
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kFirstJitter = 1e-10;  // of the variance, on the diagonal; round-off
@@ -66,4 +66,4 @@ Eigen::MatrixXd GaussianRegression::Covariance(const Eigen::MatrixXd& with,
   return own - known.transpose() * known + of_mean.transpose() * information_.solve(of_mean);
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

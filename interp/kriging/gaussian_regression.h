@@ -6,7 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 
-namespace semblance {
+namespace semblance::interp {
 
 // The model y ~ N(F b, V) with n values y, n x q regressors F of full rank (q <= n), and unknown b.
 class GaussianRegression {
@@ -49,4 +49,4 @@ class GaussianRegression {
   Eigen::MatrixXd inverse_root_;  // empty without PrepareVariance
 };
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -8,7 +8,7 @@
 #include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr Eigen::Index kFitSamples = 200;  // enough to determine two numbers; the cost grows with
@@ -156,4 +156,4 @@ DepthField InterpolateDepth(const Kriging& options, const DepthInput& input,
   return field;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -14,7 +14,7 @@
 #include "interp/kriging/depth_mean.h"
 #include "interp/on_surface/surface_distance.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class Covariance { kMatern12, kMatern32, kMatern52, kSquaredExponential };
 constexpr auto EnumNames(Covariance) {
@@ -90,4 +90,4 @@ DepthPosterior KrigingPosterior(const Kriging& options, const DepthInput& input,
 // geodesic distances are requested and the skull has no triangle.
 DepthField InterpolateDepth(const Kriging& options, const DepthInput& input, const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

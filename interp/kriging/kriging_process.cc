@@ -8,7 +8,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kRounding = 1e-6;    // of the variance; round-off in a variance of 0
@@ -220,4 +220,4 @@ KrigingHyper FitHyper(const Kriging& options, const KrigingData& data, const Run
   return hyper;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -15,7 +15,7 @@
 #include "interp/kriging/kriging.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // The data of a process: n dowels.
 struct KrigingData {
@@ -116,4 +116,4 @@ double DepthSpread(const Eigen::VectorXd& depth_mm);
 // options fix are kept. Throws Cancelled if stopped.
 KrigingHyper FitHyper(const Kriging& options, const KrigingData& data, const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -18,7 +18,7 @@
 #include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr Eigen::Index kMaternSamples = 60;  // enough to determine three numbers; the number of
@@ -296,4 +296,4 @@ SurfaceMaternHyper FitHyper(const SurfaceMatern& options, const SurfaceMaternDat
   return hyper;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -12,7 +12,7 @@
 #include "interp/dowels/dowel_samples.h"
 #include "interp/kriging/depth_mean.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 class ReducedMatern;  // on_surface/matern_field.h
 
@@ -129,4 +129,4 @@ double SurfaceMaternCost(const SurfaceMatern& options, const SurfaceMaternData& 
 SurfaceMaternHyper FitHyper(const SurfaceMatern& options, const SurfaceMaternData& data,
                             const ReducedMatern& correlations, const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

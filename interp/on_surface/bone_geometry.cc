@@ -17,7 +17,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using HullKernel = CGAL::Exact_predicates_inexact_constructions_kernel;
@@ -180,4 +180,4 @@ Eigen::MatrixXd BoneRelief(const TriMesh& mesh, std::span<const double> scales_m
   }
   return relief;
 }
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -9,7 +9,7 @@
 #include "interp/dowels/dowel.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // The axes of the head, computed from the dowels and independent of the scan's axes.
 struct HeadFrame {
@@ -37,4 +37,4 @@ Eigen::MatrixXd BoneGeometry(const TriMesh& mesh, const HeadFrame& frame);
 // below the radii of curvature it is about -scale^2 times twice the mean curvature.
 Eigen::MatrixXd BoneRelief(const TriMesh& mesh, std::span<const double> scales_mm);
 
-}  // namespace semblance
+}  // namespace semblance::interp

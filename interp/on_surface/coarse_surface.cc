@@ -9,7 +9,7 @@
 
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kSameWay_mm = 1e-6;  // round-off: of two equally long paths the first counts
@@ -147,4 +147,4 @@ CornerWeights CoarseSurface::Locate(const Vec3& p, int skull_vertex) const {
   return best;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // The triangles around each vertex of a mesh.
 class VertexTriangles {
@@ -59,4 +59,4 @@ class CoarseSurface {
   VertexTriangles triangles_at_;  // of mesh_
 };
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -8,7 +8,7 @@
 
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr Eigen::Index kSolvedTogether = 16;  // right sides per solve: 8 bytes per vertex each
@@ -151,4 +151,4 @@ MaternCorrelations ReducedMatern::At(int alpha, double length_mm) const {
   return correlations;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -12,7 +12,7 @@
 #include "interp/on_surface/mesh_solver.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // The surface on which fields are defined by their values at vertices; a field is linear between
 // them.
@@ -90,4 +90,4 @@ class ReducedMatern {
   Eigen::VectorXd lambda_;  // r, >= 0
 };
 
-}  // namespace semblance
+}  // namespace semblance::interp

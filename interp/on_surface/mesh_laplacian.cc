@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kMaxCotangent = 100;    // an angle of 0.6 degrees
@@ -105,4 +105,4 @@ std::vector<int> LabelPieces(const Eigen::SparseMatrix<double>& stiffness) {
   return piece;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -7,7 +7,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 struct MeshLaplacian {
   // u' stiffness u is the integral of the squared gradient of u. Symmetric (both triangles are
@@ -27,4 +27,4 @@ MeshLaplacian BuildLaplacian(const TriMesh& mesh);
 // first vertex.
 std::vector<int> LabelPieces(const Eigen::SparseMatrix<double>& stiffness);
 
-}  // namespace semblance
+}  // namespace semblance::interp

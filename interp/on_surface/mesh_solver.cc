@@ -7,7 +7,7 @@
 #include <span>
 #include <utility>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr std::size_t kLeaf = 64;  // parts of so many unknowns are not divided further
@@ -333,4 +333,4 @@ Eigen::SparseMatrix<double> MeshSolver::SelectedInverse(Eigen::SparseMatrix<doub
   return entries;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

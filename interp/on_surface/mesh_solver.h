@@ -8,7 +8,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // A multifrontal Cholesky factorisation. Nested dissection leaves small dense matrices, whose
 // products are several times as fast as a sparse factorisation by columns.
@@ -41,4 +41,4 @@ class MeshSolver {
   std::vector<FrontalMatrix> frontals_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -11,7 +11,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kMinSoftness = 1e-12;  // keeps two dowels at one vertex from making the equations
@@ -338,4 +338,4 @@ DepthField AssignSpline(const std::vector<double>& depth_mm, const DepthLimits& 
   });
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -9,7 +9,7 @@
 #include "interp/dowels/dowel_network.h"
 #include "interp/dowels/dowel_samples.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class SplineEnergy {
   kGradient,  // integral of the squared gradient; harmonic between dowels
@@ -57,4 +57,4 @@ void SoftnessField(Visitor& visit, double& softness) {
       softness);
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -9,7 +9,7 @@
 
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr std::size_t kHeldTogether = 8;  // samples in memory at a time: 8 bytes per vertex each
@@ -127,4 +127,4 @@ void ForEachGeodesic(std::string_view scheme, const TriMesh& skull,
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -12,7 +12,7 @@
 #include "interp/on_surface/coarse_surface.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class DowelDistance { kEuclidean, kGeodesic };
 constexpr auto EnumNames(DowelDistance) {
@@ -56,4 +56,4 @@ void ForEachGeodesic(std::string_view scheme, const TriMesh& skull,
                      const std::vector<DepthSample>& samples, const RunContext& run,
                      const std::function<void(std::size_t, const std::vector<double>&)>& use);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -14,7 +14,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 // Reads a column; an empty cell gives NaN.
@@ -109,4 +109,4 @@ DepthField InterpolateDepth(const DepthMap& options, const DepthInput& input,
   return field;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

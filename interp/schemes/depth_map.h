@@ -8,7 +8,7 @@
 
 #include "interp/dowels/depth_input.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 struct DepthMap {
   static constexpr std::string_view kName = "depth_map";
@@ -46,4 +46,4 @@ void Fields(Visitor& visit, DepthMap& o) {
 DepthField InterpolateDepth(const DepthMap& options, const DepthInput& input,
                             const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

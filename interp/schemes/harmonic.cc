@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/schemes/harmonic.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 DepthField InterpolateDepth(const Harmonic& options, const DepthInput& input,
                             const RunContext& run) {
@@ -35,4 +35,4 @@ std::vector<DepthField> InterpolateLeftOut(const Biharmonic& options, const Dept
   return MeshSplineLeftOut({SplineEnergy::kLaplacian, 0, options.softness}, Biharmonic::kName,
                            options.clamp, options.max_angle_deg, input, folds, run);
 }
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -9,7 +9,7 @@
 #include "interp/dowels/depth_input.h"
 #include "interp/on_surface/mesh_spline.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 struct Harmonic {
   static constexpr std::string_view kName = "harmonic";
@@ -69,4 +69,4 @@ DepthField InterpolateDepth(const Biharmonic& options, const DepthInput& input,
 std::vector<DepthField> InterpolateLeftOut(const Biharmonic& options, const DepthInput& input,
                                            const Folds& folds, const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

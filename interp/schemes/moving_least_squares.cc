@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kMinLogWeight = -40;  // log of weight over the nearest dowel's; smaller weights
@@ -68,4 +68,4 @@ DepthField InterpolateDepth(const MovingLeastSquares& options, const DepthInput&
   });
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -7,7 +7,7 @@
 #include "interp/dowels/depth_input.h"
 #include "interp/dowels/dowel_samples.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 struct MovingLeastSquares {
   static constexpr std::string_view kName = "moving_least_squares";
@@ -44,4 +44,4 @@ void Fields(Visitor& visit, MovingLeastSquares& o) {
 DepthField InterpolateDepth(const MovingLeastSquares& options, const DepthInput& input,
                             const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

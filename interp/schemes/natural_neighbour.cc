@@ -8,7 +8,7 @@
 #include "interp/dowels/dowel_samples.h"
 #include "interp/schemes/power_cell.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kOpenCellRatio =
@@ -167,4 +167,4 @@ DepthField InterpolateDepth(const NaturalNeighbour& options, const DepthInput& i
   });
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -8,7 +8,7 @@
 
 #include "interp/dowels/depth_input.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class NeighbourWeights { kSibson, kLaplace };
 constexpr auto EnumNames(NeighbourWeights) {
@@ -41,4 +41,4 @@ void Fields(Visitor& visit, NaturalNeighbour& o) {
 DepthField InterpolateDepth(const NaturalNeighbour& options, const DepthInput& input,
                             const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

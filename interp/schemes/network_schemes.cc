@@ -7,7 +7,7 @@
 #include <set>
 #include <vector>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using Edge = std::array<int, 2>;  // dowels, lower index first
@@ -192,4 +192,4 @@ DepthField InterpolateDepth(const NetworkSpline& options, const DepthInput& inpu
                        });
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -8,7 +8,7 @@
 #include "interp/dowels/dowel_area.h"
 #include "interp/dowels/dowel_samples.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // The thesis's scheme (2.2): the depth is linear in each dowel area.
 struct Barycentric {
@@ -65,4 +65,4 @@ void Fields(Visitor& visit, NetworkSpline& o) {
 DepthField InterpolateDepth(const NetworkSpline& options, const DepthInput& input,
                             const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

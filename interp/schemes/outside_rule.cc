@@ -11,7 +11,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 struct Depth {
@@ -151,4 +151,4 @@ DepthField ApplyOutsideRule(const OutsideRule& rule, const DepthInput& input, De
   return field;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 
 #include "interp/dowels/depth_input.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // Continues the network outwards by the depth at the closest point of its triangles, with a smooth
 // transition to a site's depth. Let s be the dowels' mean depth. Up to the distance s from the
@@ -72,4 +72,4 @@ using OutsideRule = std::variant<ExtendNetwork, ConstantDepth, LeaveUnassigned>;
 DepthField ApplyOutsideRule(const OutsideRule& rule, const DepthInput& input, DepthField field,
                             const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

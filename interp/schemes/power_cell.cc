@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -241,4 +241,4 @@ void SibsonAreas(std::span<const PowerSite> sites, const CellPolygon& cell, Site
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

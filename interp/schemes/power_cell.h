@@ -8,7 +8,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // A site in a plane with the point as origin. The site's power at x minus the point's power is the
 // linear function distance2 - 2 position . x, which is negative where the site keeps x.
@@ -60,4 +60,4 @@ bool SibsonAreasByEnvelope(std::span<const PowerSite> sites, const CellPolygon& 
 void SibsonAreasByClipping(std::span<const PowerSite> sites, const CellPolygon& cell,
                            SiteAreas& twice_area);
 
-}  // namespace semblance
+}  // namespace semblance::interp

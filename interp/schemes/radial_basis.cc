@@ -9,7 +9,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 // The kernel of r, in units of the frame's size. The signs make every kernel conditionally positive
@@ -106,4 +106,4 @@ DepthField InterpolateDepth(const RadialBasis& options, const DepthInput& input,
   });
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -9,7 +9,7 @@
 #include "interp/dowels/depth_input.h"
 #include "interp/dowels/dowel_samples.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class RadialKernel { kLinear, kCubic, kGaussian, kWendlandC2 };
 constexpr auto EnumNames(RadialKernel) {
@@ -67,4 +67,4 @@ void Fields(Visitor& visit, RadialBasis& o) {
 DepthField InterpolateDepth(const RadialBasis& options, const DepthInput& input,
                             const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -8,7 +8,7 @@
 
 #include "interp/dowels/dowel_samples.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 const Dowel& NearestDowel(std::span<const Dowel> dowels, const Vec3& p) {
@@ -158,4 +158,4 @@ DepthField InterpolateDepth(const InverseDistance& options, const DepthInput& in
   });
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

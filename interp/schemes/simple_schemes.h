@@ -9,7 +9,7 @@
 #include "interp/dowels/depth_input.h"
 #include "interp/on_surface/surface_distance.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // One depth for the whole skull: the scheme that all others must beat.
 struct Mean {
@@ -71,4 +71,4 @@ void Fields(Visitor& visit, InverseDistance& o) {
 DepthField InterpolateDepth(const InverseDistance& options, const DepthInput& input,
                             const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -16,7 +16,7 @@
 #include "interp/stacking/stacking_weights.h"
 #include "surfaces/base/farthest_first.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 constexpr std::size_t kMaxTestDowels = 64;  // left-out dowels; the cost grows with the fourth power
@@ -279,4 +279,4 @@ DepthField InterpolateDepth(const AutoScheme& options, const DepthInput& input,
   return field;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -9,7 +9,7 @@
 
 #include "interp/stacking/single_scheme.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 enum class AutoTakes { kAverage, kBest };
 constexpr auto EnumNames(AutoTakes) { return std::to_array<std::string_view>({"average", "best"}); }
@@ -57,4 +57,4 @@ void Fields(Visitor& visit, AutoScheme& o) {
 DepthField InterpolateDepth(const AutoScheme& options, const DepthInput& input,
                             const RunContext& run);
 
-}  // namespace semblance
+}  // namespace semblance::interp

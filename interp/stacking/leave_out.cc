@@ -14,7 +14,7 @@
 #include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using Fold = std::vector<std::size_t>;
@@ -188,4 +188,4 @@ SdByDistance FitSdByDistance(std::span<const double> errors_mm,
   return {Quantile(ratios, 0.5) / kHalfWithin, unit.distance_mm};
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

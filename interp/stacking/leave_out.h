@@ -12,7 +12,7 @@
 #include "interp/stacking/single_scheme.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 // The properties of a scheme that LeaveOut needs.
 struct Interpolator {
@@ -57,4 +57,4 @@ struct SdByDistance {
 SdByDistance FitSdByDistance(std::span<const double> errors_mm,
                              std::span<const double> distances_mm);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -3,7 +3,7 @@
 
 #include <type_traits>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 template <class Scheme>
@@ -55,4 +55,4 @@ std::size_t SingleFewestDowels(const SingleScheme& scheme) {
       scheme);
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

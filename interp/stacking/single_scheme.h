@@ -15,7 +15,7 @@
 #include "interp/schemes/radial_basis.h"
 #include "interp/schemes/simple_schemes.h"
 
-namespace semblance {
+namespace semblance::interp {
 
 using SingleScheme =
     std::variant<Barycentric, Nearest, Mean, InverseDistance, RadialBasis, MovingLeastSquares,
@@ -33,4 +33,4 @@ bool SingleNeedsNetwork(const SingleScheme& scheme);
 // The smallest number of dowels at distinct places that the scheme needs; 1 for most schemes.
 std::size_t SingleFewestDowels(const SingleScheme& scheme);
 
-}  // namespace semblance
+}  // namespace semblance::interp

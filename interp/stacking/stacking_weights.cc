@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 // Minimises w' Q w - 2 b' w over the free predictors with weights of sum 1, which may be negative;
@@ -112,4 +112,4 @@ Eigen::VectorXd StackedErrors(const Eigen::MatrixXd& errors, const Eigen::Vector
   return stacked;
 }
 
-}  // namespace semblance
+}  // namespace semblance::interp

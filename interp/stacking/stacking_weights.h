@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace semblance {
+namespace semblance::interp {
 
 // Computes the weights (>= 0, sum 1) that minimise the mixture's mean squared error, weighted by
 // importance, plus caution * (smallest mean squared error of a single predictor) * (squared
@@ -19,4 +19,4 @@ Eigen::VectorXd StackingWeights(const Eigen::MatrixXd& errors, const Eigen::Vect
 Eigen::VectorXd StackedErrors(const Eigen::MatrixXd& errors, const Eigen::VectorXd& importance,
                               double caution);
 
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -7,7 +7,7 @@
 
 #include "problems/app/commands.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 std::span<const ProgramCommand> RunCommands();         // run, depth, import-ct, check, options ...
 std::span<const ProgramCommand> FitCommands();         // fit: any scattered points
@@ -19,4 +19,4 @@ std::span<const ProgramCommand> PopulationCommands();  // population
 std::span<const ProgramCommand> PhantomCommands();     // phantom
 std::span<const ProgramCommand> WorkbenchCommands();   // workbench
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Reads the allowed words from the type name that CLI11 gives an option:
@@ -128,4 +128,4 @@ std::string UnknownWord(const CommandNode& program, std::span<const std::string>
   return "";
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@ namespace CLI {
 class App;
 }
 
-namespace semblance {
+namespace semblance::problems {
 
 struct OptionText {
   std::vector<std::string> names;         // with dashes; a positional argument has one name
@@ -39,4 +39,4 @@ std::string OptionWithoutValue(const CLI::App& app);
 // nearest known word, or "" if all words are known. `words` excludes the program's name.
 std::string UnknownWord(const CommandNode& program, std::span<const std::string> words);
 
-}  // namespace semblance
+}  // namespace semblance::problems

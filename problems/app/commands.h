@@ -15,7 +15,7 @@
 #include <system_error>
 #include <utility>
 
-namespace semblance {
+namespace semblance::problems {
 
 // The connection between a declared command and the rest of the program.
 struct CommandLine {
@@ -72,4 +72,4 @@ inline void Declare(std::span<const ProgramCommand> commands, CLI::App& app, Com
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

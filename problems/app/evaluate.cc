@@ -17,7 +17,7 @@
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 TriMesh ReadChecked(const std::filesystem::path& path) {
@@ -127,4 +127,4 @@ ExcludedZone ParseZone(const std::string& text) {
   return zone;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

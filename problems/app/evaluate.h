@@ -10,7 +10,7 @@
 #include "problems/experiment/metrics/face_region.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct EvaluateOptions {
   std::filesystem::path face;    // mesh, or a run's face.hspline.json
@@ -30,4 +30,4 @@ nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext
 // Parses a site and a radius in mm, e.g. "zy_r=15". Throws InputError for any other form.
 ExcludedZone ParseZone(const std::string& text);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -2,8 +2,8 @@
 // The exit codes of the program.
 #pragma once
 
-namespace semblance {
+namespace semblance::problems {
 
 inline constexpr int kDone = 0, kNotUsable = 1, kBadInput = 2;
 
-}  // namespace semblance
+}  // namespace semblance::problems

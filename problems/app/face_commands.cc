@@ -22,7 +22,7 @@
 #include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -355,4 +355,4 @@ std::span<const ProgramCommand> FaceCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

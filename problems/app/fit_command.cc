@@ -17,7 +17,7 @@
 #include "problems/app/work_options.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct FitArguments : WorkOptions {
@@ -104,4 +104,4 @@ std::span<const ProgramCommand> FitCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -25,7 +25,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -212,4 +212,4 @@ std::span<const ProgramCommand> LandmarkCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -18,7 +18,7 @@
 #include "problems/app/all_commands.h"
 #include "problems/app/program_end.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 int PrintError(const std::string& message, int exit_code) {
@@ -138,6 +138,6 @@ int Main(int argc, char** argv) {
 
 [[gnu::section(".preinit_array"), gnu::used]] void (*const kBeforeLibraries)() = &BeforeLibraries;
 
-}  // namespace semblance
+}  // namespace semblance::problems
 
-int main(int argc, char** argv) { return semblance::Main(argc, argv); }
+int main(int argc, char** argv) { return problems::Main(argc, argv); }

@@ -23,7 +23,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The arguments of the command.
@@ -139,4 +139,4 @@ std::span<const ProgramCommand> PhantomCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

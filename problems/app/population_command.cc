@@ -19,7 +19,7 @@
 #include "problems/population/population_result.h"
 #include "problems/population/population_run.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -202,4 +202,4 @@ std::span<const ProgramCommand> PopulationCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -23,7 +23,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr const char* kNoMemory =
@@ -187,4 +187,4 @@ std::stop_token StopOnSignals() {
 
 void RemoveStopTimeout() { ::alarm(0); }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 struct Failure {
   int exit_code = -1;
@@ -36,4 +36,4 @@ std::stop_token StopOnSignals();
 // end. A second signal still exits at once.
 void RemoveStopTimeout();
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::string Line(const Event& event, double elapsed_s) {
@@ -37,4 +37,4 @@ void ProgressPrinter::operator()(const Event& event) {
   std::fflush(stream_);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

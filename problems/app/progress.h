@@ -8,7 +8,7 @@
 
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Prints events as lines to a stream: the first and last event of each step, and at most one per
 // `interval` between them.
@@ -27,4 +27,4 @@ class ProgressPrinter {
   std::string last_step_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -42,7 +42,7 @@
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The arguments of all commands of this file. Each command reads its part.
@@ -546,4 +546,4 @@ std::span<const ProgramCommand> RunCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Returns true if the whole `text` is "I/N".
@@ -38,4 +38,4 @@ Shard ParseShard(const std::string& text) {
   return shard;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

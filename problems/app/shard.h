@@ -4,7 +4,7 @@
 
 #include <string>
 
-namespace semblance {
+namespace semblance::problems {
 
 struct Shard {
   int index = 0, count = 1;
@@ -15,4 +15,4 @@ struct Shard {
 // other text.
 Shard ParseShard(const std::string& text);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "problems/config/terminal_text.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Calls `use` for each command, with the words that lead to it: "landmarks convert".
@@ -265,4 +265,4 @@ std::string ManualPage(const CommandNode& program) {
   return text;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -6,7 +6,7 @@
 
 #include "problems/app/command_tree.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Each returns a script that completes commands, options and files.
 std::string BashCompletion(const CommandNode& program);
@@ -16,4 +16,4 @@ std::string FishCompletion(const CommandNode& program);
 // Returns the manual page in troff's man macros, with a section of all commands and their options.
 std::string ManualPage(const CommandNode& program);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -22,7 +22,7 @@
 #include "problems/study/report/study_ranking.h"
 #include "problems/study/report/study_report.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -334,4 +334,4 @@ std::span<const ProgramCommand> StudyCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

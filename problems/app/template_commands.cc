@@ -29,7 +29,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -256,4 +256,4 @@ std::span<const ProgramCommand> TemplateCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

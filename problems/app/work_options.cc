@@ -9,7 +9,7 @@
 #include "problems/app/exit_code.h"
 #include "problems/app/progress.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 void AddSet(CLI::App& command, WorkOptions& options) {
   command
@@ -66,4 +66,4 @@ int PrintFaults(const std::vector<std::string>& faults) {
   return faults.empty() ? kDone : kNotUsable;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "problems/io/staged_folder.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct WorkOptions {
   std::vector<std::string> overrides;
@@ -64,4 +64,4 @@ StagedFolder MakeStagedFolder(const WorkOptions& options, const std::string& def
 // Prints the faults of a result and returns the exit code.
 int PrintFaults(const std::vector<std::string>& faults);
 
-}  // namespace semblance
+}  // namespace semblance::problems

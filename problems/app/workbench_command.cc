@@ -22,7 +22,7 @@
 #include "problems/app/workbench/http_server.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -130,4 +130,4 @@ std::span<const ProgramCommand> WorkbenchCommands() {
   return kCommands;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

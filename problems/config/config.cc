@@ -18,7 +18,7 @@
 #include "problems/config/utf8_check.h"
 #include "surfaces/base/atomic_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using SourcePtr = std::shared_ptr<const ConfigSource>;
@@ -439,4 +439,4 @@ int CommonKeys(const ConfigNode& a, const ConfigNode& b) {
                     [&](const ConfigNode::Entry& entry) { return b.Find(entry.key) != nullptr; }));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

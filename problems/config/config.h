@@ -82,7 +82,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Parses one YAML text. Adds an error for everything that the tree cannot represent: repeated keys,
 // anchors, tags and so on. Returns null for an empty text, and an empty map after a syntax error.
@@ -186,4 +186,4 @@ std::string OptionsSchema() {
   return SchemaText(config_internal::DescribeType(T{}));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

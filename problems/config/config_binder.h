@@ -25,7 +25,7 @@
 #include "problems/config/config_reader.h"
 #include "problems/config/options_reference.h"
 
-namespace semblance::config_internal {
+namespace semblance::problems::config_internal {
 
 template <class T, template <class...> class Template>
 inline constexpr bool kIs = false;
@@ -357,9 +357,9 @@ ConfigType DescribeType(const T& value) {
   return type;
 }
 
-}  // namespace semblance::config_internal
+}  // namespace semblance::problems::config_internal
 
-namespace semblance {
+namespace semblance::problems {
 
 struct NamedFile {
   std::string option;          // path of the option, e.g. "subject.skull"
@@ -408,4 +408,4 @@ std::vector<NamedFile> NamedFiles(const T& value) {
   return files;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

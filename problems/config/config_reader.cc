@@ -12,7 +12,7 @@
 
 #include "problems/config/spelling_suggestion.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 void AddError(ConfigErrors& errors, const ConfigItem& item, std::string_view what) {
@@ -342,4 +342,4 @@ ConfigNode ScalarToTree(const std::filesystem::path& value) {
 
 }  // namespace config_internal
 
-}  // namespace semblance
+}  // namespace semblance::problems

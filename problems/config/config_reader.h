@@ -14,7 +14,7 @@
 #include "problems/config/config_tree.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // An entry of a tree and the field that it is read into.
 struct ConfigItem {
@@ -83,4 +83,4 @@ inline ConfigNode ScalarToTree(const ConfigNode& value) { return value; }
 
 }  // namespace config_internal
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // One step of a path: a key, or an index into a list.
@@ -396,4 +396,4 @@ std::string ToYaml(const ConfigNode& tree) {
   return out;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Limits against hostile files, far above what real files need. They bound recursion, which must
 // fit the stack: levels of nested maps and lists, steps of a path, and bases including their own
@@ -151,4 +151,4 @@ std::string ToYaml(const ConfigNode& tree);
 // Writes a tree on one line: {a: 1, b: [2, 3]}. Numbers that are not finite are allowed.
 std::string ToFlowYaml(const ConfigNode& tree);
 
-}  // namespace semblance
+}  // namespace semblance::problems

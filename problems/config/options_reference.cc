@@ -12,7 +12,7 @@
 #include "problems/config/config_reader.h"
 #include "problems/config/config_tree.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -301,4 +301,4 @@ std::string SchemaText(const ConfigType& type) {
   return schema.dump(2) + "\n";
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/config/config_tree.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ConfigField;
 struct ConfigAlternative;
@@ -64,4 +64,4 @@ std::string SchemaText(const ConfigType& type);
 // object with `type` for a variant, null for a number that is not finite.
 nlohmann::ordered_json ValueJson(const ConfigNode& tree, const ConfigType& type);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include <cctype>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 char Lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
@@ -67,4 +67,4 @@ std::string Suggestion(std::string_view word, std::span<const std::string> known
   return known.empty() ? "" : fmt::format("; known are: {}", fmt::join(known, ", "));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Returns the least number of letters to insert, delete, replace or swap with their neighbour that
 // turns `a` into `b` (optimal string alignment). Ignores upper and lower case.
@@ -20,4 +20,4 @@ std::string NearestWord(std::string_view word, std::span<const std::string> know
 // Returns "; did you mean 'x'?" if a known word is near, else "; known are: a, b, c".
 std::string Suggestion(std::string_view word, std::span<const std::string> known);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-namespace semblance {
+namespace semblance::problems {
 
 std::string ForTerminal(std::string_view text) {
   std::string result;
@@ -25,4 +25,4 @@ std::string QuotedForShell(std::string_view text) {
   return quoted + "'";
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

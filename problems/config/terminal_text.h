@@ -8,7 +8,7 @@
 #include <string_view>
 #include <utility>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Replaces every control character except line feeds by '?', also U+0080 to U+009F, so that no name
 // in a file can control the terminal.
@@ -23,4 +23,4 @@ void Tell(fmt::format_string<Values...> words, Values&&... values) {
   fmt::print("{}", ForTerminal(fmt::format(words, std::forward<Values>(values)...)));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 unsigned char ByteAt(std::string_view text, std::size_t i) {
@@ -108,4 +108,4 @@ std::optional<int> LineThatIsNotUtf8(std::string_view text) {
   return std::nullopt;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "problems/config/config_tree.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Adds an error for each line that has a tab outside a comment (it looks like spaces), another
 // control character, or a byte that is not UTF-8. Returns true if there is none.
@@ -18,4 +18,4 @@ bool RequireReadableBytes(std::string_view text, const std::shared_ptr<const Con
 // Returns the line, from 1, of the first byte that is not UTF-8, or nothing.
 std::optional<int> LineThatIsNotUtf8(std::string_view text);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "problems/config/spelling_suggestion.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // kAll holds if every part holds, kAny if one part does, kNot if its only part does not.
 struct ValueFilter::Node {
@@ -237,7 +237,7 @@ ValueFilter::~ValueFilter() = default;
 ValueFilter::ValueFilter(ValueFilter&&) noexcept = default;
 
 bool ValueFilter::Holds(const NamedValues& values) const {
-  return semblance::Holds(*root_, values);
+  return problems::Holds(*root_, values);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include <string>
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Reads a text as a number. Returns nothing unless the whole text is one finite number.
 std::optional<double> NumberIn(std::string_view text);
@@ -44,4 +44,4 @@ class ValueFilter {
   std::unique_ptr<const Node> root_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 template <class Item>
@@ -363,4 +363,4 @@ ScoredSkin FindScoredSkin(const Case& subject, const OuterSkin& outer,
                         subject.scored_network, options);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "problems/experiment/experiment.h"
 #include "problems/subject/mirror.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A subject as it was read or made, before any choice of depth or network.
 struct SubjectData {
@@ -74,4 +74,4 @@ ScoredSkin FindScoredSkin(const Case& subject, const FaceRegionOptions& options)
 ScoredSkin FindScoredSkin(const Case& subject, const OuterSkin& outer,
                           const FaceRegionOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The scores over the vertices with counts(v).
@@ -105,4 +105,4 @@ DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& st
   return comparison;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/experiment/metrics/face_metrics.h"
 #include "problems/experiment/skull_stage.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Errors against the truth of one convention. Positive: the interpolated depth is too large.
 struct DepthErrors {
@@ -44,4 +44,4 @@ struct DepthComparison {
 DepthComparison CompareDepths(const Experiment& experiment, const DepthStage& stage,
                               const DepthField& depth, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

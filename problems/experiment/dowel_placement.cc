@@ -11,7 +11,7 @@
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr double kMaxShift_mm = 40;  // of the shell from a dowel's base or tip, along the dowel
@@ -213,4 +213,4 @@ FitTarget AllDowels(std::span<const Dowel> dowels, const TemplateFace& placed,
   return target;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

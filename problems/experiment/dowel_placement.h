@@ -13,7 +13,7 @@
 #include "problems/subject/extra_sites.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // ---------------------------------------------------------------------------------------------
 // Onto the shell
@@ -58,4 +58,4 @@ Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& known,
 FitTarget AllDowels(std::span<const Dowel> dowels, const TemplateFace& placed,
                     const ExtraSites& sites);
 
-}  // namespace semblance
+}  // namespace semblance::problems

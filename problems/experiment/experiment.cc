@@ -16,7 +16,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The levels of the generic face, which limit those of other options.
@@ -339,4 +339,4 @@ template std::string OptionsSchema<Experiment>();
 
 ConfigType DescribeExperiment() { return config_internal::DescribeType(Experiment{}); }
 
-}  // namespace semblance
+}  // namespace semblance::problems

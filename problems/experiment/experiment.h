@@ -35,7 +35,7 @@
 #include "surfaces/implicit_face.h"
 #include "surfaces/mesh/skull_fill.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A subject in files of meshes.
 struct FileSubject {
@@ -360,4 +360,4 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment);
 // them.
 std::vector<std::string> UnusedOptions(const Experiment& experiment);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/config/config.h"
 #include "problems/experiment/experiment.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 extern template ConfigNode MakeConfigTree(const Experiment& value);
 extern template Experiment ReadConfigTree(const ConfigNode& tree, ConfigErrors& errors);
@@ -40,4 +40,4 @@ std::string StageKey(const char* stage, const Options&... options) {
   return key;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 const Landmark* FindLandmark(const LandmarkFile& file, const std::string& site) {
@@ -340,4 +340,4 @@ void FillOpenDowels(const TriMesh& shell, const DepthField& depth, Case& subject
   subject.open_dowels.clear();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/experiment/case.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The experiment's tissue options for the landmarks. set_mm has the depths of those `sites` that
 // are landmarks, and lacks the entries that only inserted dowels use. Throws InputError if a depth
@@ -39,4 +39,4 @@ std::vector<std::string> JoinNetwork(const NetworkPlan& plan, std::span<const Do
 // A dowel without an interpolated depth is left out, with a note.
 void FillOpenDowels(const TriMesh& shell, const DepthField& depth, Case& subject);
 
-}  // namespace semblance
+}  // namespace semblance::problems

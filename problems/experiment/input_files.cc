@@ -26,7 +26,7 @@
 #include "surfaces/base/csv.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -301,4 +301,4 @@ CheckFindings InputCheck::Look(const Experiment& experiment) {
   return findings;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

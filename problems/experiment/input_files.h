@@ -17,7 +17,7 @@
 #include "problems/experiment/stage_cache.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The files that an experiment reads, each with the option that names it, in the order of the
 // options. A table that no depth is taken from (`depths: measured`) is left out.
@@ -69,4 +69,4 @@ class InputCheck {
   std::map<std::string, CheckFindings> known_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

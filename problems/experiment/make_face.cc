@@ -25,7 +25,7 @@
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 TemplateFace InSubjectFrame(const TemplateFace& generic, const Similarity& face_from_template) {
@@ -572,4 +572,4 @@ FaceUncertainty PriorUncertainty(const UncertaintyOptions& options, const Loaded
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "problems/face/hspline_prior.h"
 #include "surfaces/mesh/cut_planes.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The generic face in the subject's frame.
 struct PlacedTemplate {
@@ -84,4 +84,4 @@ std::optional<HSplineSurface> EditByHand(const Experiment& experiment, MadeFace&
 FaceUncertainty PriorUncertainty(const UncertaintyOptions& options, const LoadedPrior& prior,
                                  const MadeFace& made, const Tessellation& face);
 
-}  // namespace semblance
+}  // namespace semblance::problems

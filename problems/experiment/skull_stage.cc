@@ -14,7 +14,7 @@
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/extra_dowels.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 template <class T>
@@ -254,4 +254,4 @@ std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache
   });
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

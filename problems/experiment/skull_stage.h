@@ -18,7 +18,7 @@
 #include "surfaces/implicit_face.h"
 #include "surfaces/mesh/cut_planes.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // ---------------------------------------------------------------------------------------------
 // The cache of the implicit face, the longest step of a run, in a folder that processes share
@@ -68,4 +68,4 @@ struct SkullStage {
 std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& experiment, StageCache& cache,
                                                  StepClock& step, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

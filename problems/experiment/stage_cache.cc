@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-namespace semblance {
+namespace semblance::problems {
 
 StageCache::Value StageCache::GetAny(const std::string& key, const std::function<Value()>& make) {
   std::promise<Value> promise;
@@ -42,4 +42,4 @@ int StageCache::made() const {
   return made_;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 
 #include "problems/io/disk_cache.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Safe from several threads: the first one that requests a key makes its value, and the others wait
 // for it. Keeps the `capacity` (>= 1) values that were requested last. Dropped values live on while
@@ -48,4 +48,4 @@ class StageCache {
   int made_ = 0;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct Remedy {
@@ -36,4 +36,4 @@ void ThrowOutOfMemory(const char* step) {
       "not enough memory for the step '{}'; {}, or run fewer trials at a time", step, remedy));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct StepTime {
   std::string step;
@@ -55,4 +55,4 @@ class StepClock {
   std::vector<StepTime> times_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

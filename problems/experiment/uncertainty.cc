@@ -13,7 +13,7 @@
 #include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The depth behind a point of the fit: its place on the skull, and its uncertainty by the dowels.
@@ -303,4 +303,4 @@ SigmaCoverage MeasureCoverage(const TrueSkin& skin, const TriMesh& face,
   return coverage;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

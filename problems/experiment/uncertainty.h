@@ -15,7 +15,7 @@
 #include "problems/experiment/skull_stage.h"
 #include "surfaces/hspline_query/tessellate.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Shares, 0..1, of the scored true skin whose distance from the face lies within the central
 // interval of a normal distribution of the stated sigma (interp/evaluation/calibration.h).
@@ -74,4 +74,4 @@ SigmaCoverage MeasureCoverage(const TrueSkin& skin, const TriMesh& face,
                               std::span<const double> sigma_mm, std::span<const Sphere> masks,
                               const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

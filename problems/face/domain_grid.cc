@@ -10,7 +10,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Matrix = Eigen::MatrixXd;
@@ -94,4 +94,4 @@ HSplineSurface SurfaceThrough(const HSplineShape& shape, const DomainGrid& grid,
   return surface;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // columns x rows points (u,v), u fastest, from (0,0) to (1,1).
 struct DomainGrid {
@@ -37,4 +37,4 @@ ControlNet NetThrough(const HSplineShape& shape, int level, const DomainGrid& gr
 HSplineSurface SurfaceThrough(const HSplineShape& shape, const DomainGrid& grid,
                               std::span<const Vec3> samples, double tolerance_mm = 0.02);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include "problems/config/config.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Changes = std::map<VertexId, std::optional<Vec3>>;
@@ -105,4 +105,4 @@ EditScript ApplyEdits(const EditScript& script, HSplineSurface& surface) {
   return inverse;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

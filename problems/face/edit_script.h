@@ -11,7 +11,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // One vertex of one level. On level 0 the offset is added to the vertex, in world axes. On finer
 // levels it replaces the vertex's offset from the coarser surface (thesis 4.1), and null removes
@@ -92,4 +92,4 @@ EditScript ReadEditScript(const std::filesystem::path& path);
 // or cannot hold an offset.
 EditScript ApplyEdits(const EditScript& script, HSplineSurface& surface);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -325,4 +325,4 @@ std::vector<fs::path> ModesPriorFiles(const ModesPrior& source) {
   return files;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/face/shape_model/shape_fit.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct NoPrior {
   static constexpr std::string_view kName = "none";
@@ -110,4 +110,4 @@ FacePrior LoadPrior(const ModesPrior& source);
 // read.
 std::vector<std::filesystem::path> ModesPriorFiles(const ModesPrior& source);
 
-}  // namespace semblance
+}  // namespace semblance::problems

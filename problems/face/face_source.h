@@ -9,7 +9,7 @@
 #include "problems/face/prior_observations.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // prior_then_fit if there is a prior of the template, else fit.
 struct AutoFace {
@@ -150,4 +150,4 @@ inline const PriorUse* FindPriorUse(const FaceSource& face) {
 
 inline bool UsesPrior(const FaceSource& face) { return FindPriorUse(face) != nullptr; }
 
-}  // namespace semblance
+}  // namespace semblance::problems

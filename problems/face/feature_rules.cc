@@ -12,7 +12,7 @@
 #include "interp/dowels/dowel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kFirstFeature = 28, kRuleFeatures = 41;  // of Multi-PIE
@@ -338,4 +338,4 @@ std::vector<std::string> ExplainUnusedRules(const FeatureRules& rules,
   return notes;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct RuleUse {
   std::optional<bool> use = std::nullopt;
@@ -136,4 +136,4 @@ std::vector<std::string> ExplainUnusedRules(const FeatureRules& rules,
                                             const std::map<std::string, Vec3>& landmarks,
                                             bool is_posed, const FacePrior* prior);
 
-}  // namespace semblance
+}  // namespace semblance::problems

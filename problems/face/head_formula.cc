@@ -16,7 +16,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // ---------------------------------------------------------------------------------------------
@@ -454,4 +454,4 @@ Vec2 UvOnGenericHead(const std::string& code) {
   return found->second;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

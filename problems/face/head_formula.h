@@ -10,7 +10,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A point of the generic face in mm (LPS). The face looks to -y, and its soft-tissue nasion is near
 // the origin. u in [0,1] runs from just behind the subject's right ear (azimuth -110 deg about the
@@ -36,4 +36,4 @@ std::vector<std::string> FacialLandmarkCodes();
 // The (u,v) of a standard site or of a facial landmark. Throws InputError for another code.
 Vec2 UvOnGenericHead(const std::string& code);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr double kFarthestRmsMm = 5;  // of a template from the mean that it was made from
@@ -424,4 +424,4 @@ std::vector<std::filesystem::path> PriorFiles(const PriorSource& source) {
   return std::visit([](const auto& given) { return ListFiles(given); }, source);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

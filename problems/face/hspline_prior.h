@@ -16,7 +16,7 @@
 #include "problems/face/face_prior.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // ---------------------------------------------------------------------------------------------
 // Faces of the prior as H-splines
@@ -105,4 +105,4 @@ FacePrior LoadPrior(const PriorSource& source, const TemplateFace& face);
 // The files that LoadPrior reads, for the manifest. Throws as ModesPriorFiles does.
 std::vector<std::filesystem::path> PriorFiles(const PriorSource& source);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -5,7 +5,7 @@
 
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 std::string_view IctSurface();   // head.hspline.json
 std::string_view IctSites();     // sites.csv
@@ -13,4 +13,4 @@ std::string_view IctFeatures();  // features.json
 std::string_view IctModes();     // modes.json
 std::string_view IctHead();      // bust.json
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The deviations (sd) of configs/tables/t_table_2023.yaml.
@@ -126,4 +126,4 @@ ShapeTarget PriorTarget(const FacePrior& prior, std::span<const Dowel> dowels,
   return target;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

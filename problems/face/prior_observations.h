@@ -14,7 +14,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // ---------------------------------------------------------------------------------------------
 // Depths of a table
@@ -157,4 +157,4 @@ ShapeTarget PriorTarget(const FacePrior& prior, std::span<const Dowel> dowels,
                         const TableDepthOptions* from_table, const TriMesh* implicit,
                         const std::map<std::string, ModelPoint>& more = {});
 
-}  // namespace semblance
+}  // namespace semblance::problems

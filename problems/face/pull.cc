@@ -9,7 +9,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // In patches. A smaller reach may move no vertex; a larger one moves most of a face.
@@ -159,4 +159,4 @@ EditScript Pulled(const Pull& pull, const HSplineSurface& face, const EditScript
   return WithOffsets(script, changed);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

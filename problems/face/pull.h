@@ -8,7 +8,7 @@
 
 #include "problems/face/edit_script.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct Pull {
   int level = 2;                      // level whose vertices move; a coarser one moves more
@@ -33,4 +33,4 @@ EditScript WithOffsets(EditScript script, const std::map<VertexId, std::optional
 // v). Throws InputError if the face has no such direction.
 Vec3 FindLeft(const HSplineSurface& face);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 Vec3 MirroredInX(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
@@ -265,4 +265,4 @@ Recentred Recentre(const FacePrior& prior, const PriorOnTemplate& on_template,
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

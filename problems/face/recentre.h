@@ -12,7 +12,7 @@
 #include "problems/face/hspline_prior.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A head whose skin is known, with measured depths.
 struct KnownHead {
@@ -48,4 +48,4 @@ Recentred Recentre(const FacePrior& prior, const PriorOnTemplate& on_template,
                    const TemplateFace& face, std::span<const KnownHead> heads,
                    const RecentreOptions& options, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

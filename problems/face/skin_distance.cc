@@ -14,7 +14,7 @@
 #include "surfaces/hspline_query/hspline_batch.h"
 #include "surfaces/hspline_query/tessellate.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Normals within 60 degrees (docs/real-heads.md). A smaller cosine matches more of the skin that
@@ -244,4 +244,4 @@ int CountFolds(const HSplineSurface& surface, int threads) {
   return folds;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "surfaces/mesh/correspondences.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // ---------------------------------------------------------------------------------------------
 // Matching
@@ -89,4 +89,4 @@ class TemplateDistance {
 // normals differ by more than 120 degrees.
 int CountFolds(const HSplineSurface& surface, int threads);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -131,4 +131,4 @@ SkinLandmarks ReadSkinLandmarks(std::span<const fs::path> files) {
   return landmarks;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

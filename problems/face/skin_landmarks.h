@@ -9,7 +9,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct SkinLandmark {
   std::string code;  // of a standard site, or of FacialLandmarks() (head_formula.h)
@@ -34,4 +34,4 @@ struct SkinLandmarks {
 // appears twice or if there is no landmark at all.
 SkinLandmarks ReadSkinLandmarks(std::span<const std::filesystem::path> files);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The least-squares fit of one level's plain B-spline to a grid of samples of the formula.
@@ -165,4 +165,4 @@ Sphere Transformed(const Sphere& sphere, const Similarity& to_from) {
   return {to_from * sphere.center, to_from.scale * sphere.radius_mm};
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

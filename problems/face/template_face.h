@@ -13,7 +13,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct FormulaTemplate {
   static constexpr std::string_view kName = "formula";
@@ -99,4 +99,4 @@ std::vector<Sphere> TemplateMasks(const TemplateFace& face);
 // The image of a sphere under a similarity.
 Sphere Transformed(const Sphere& sphere, const Similarity& to_from);
 
-}  // namespace semblance
+}  // namespace semblance::problems

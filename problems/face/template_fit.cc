@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/hspline_project.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kCoarsestEnd = 3, kFinestEnd = 6;  // levels at which the fit may end
@@ -265,4 +265,4 @@ TemplateFit FitTemplate(const OuterHead& head, const TemplateFitOptions& options
   return fit;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

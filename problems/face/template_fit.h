@@ -11,7 +11,7 @@
 #include "problems/face/template_placement.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct TemplateFitOptions {
   // Root mean square distance of the face from the skin at which the fit ends, at the first level
@@ -57,4 +57,4 @@ struct TemplateFit {
 TemplateFit FitTemplate(const OuterHead& head, const TemplateFitOptions& options,
                         const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -20,7 +20,7 @@
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kFewestMidline = 3, kFewestPairs = 2;            // as the header states
@@ -277,4 +277,4 @@ TemplateFace WarpedGenericHead(const OuterHead& head, int max_level) {
   return face;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

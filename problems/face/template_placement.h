@@ -10,7 +10,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The parts of a head from which a template is made.
 struct OuterHead {
@@ -43,4 +43,4 @@ OuterHead PrepareHead(const TriMesh& head, const SkinLandmarks& landmarks, const
 // hold the formula's detail. The sites are the formula's; the features have vertices of all levels.
 TemplateFace WarpedGenericHead(const OuterHead& head, int max_level);
 
-}  // namespace semblance
+}  // namespace semblance::problems

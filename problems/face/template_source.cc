@@ -19,7 +19,7 @@
 #include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -273,4 +273,4 @@ std::vector<std::filesystem::path> TemplateFiles(const TemplateSource& source) {
   return named;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/face/template_face.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct FileTemplate {
   static constexpr std::string_view kName = "file";
@@ -62,4 +62,4 @@ TemplateFace LoadTemplate(const TemplateSource& source);
 // The files that LoadTemplate reads, for the manifest.
 std::vector<std::filesystem::path> TemplateFiles(const TemplateSource& source);
 
-}  // namespace semblance
+}  // namespace semblance::problems

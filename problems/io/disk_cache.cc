@@ -13,7 +13,7 @@
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -112,4 +112,4 @@ void DiskCache::Trim() const {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

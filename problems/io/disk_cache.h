@@ -9,7 +9,7 @@
 #include <string>
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Several threads and processes may use one folder at the same time: a file is written whole or not
 // at all, contains a hash of its content, and counts as missing if the hash does not match. Faults
@@ -33,4 +33,4 @@ class DiskCache {
   std::uintmax_t limit_bytes_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -4,7 +4,7 @@
 
 #include <system_error>
 
-namespace semblance {
+namespace semblance::problems {
 
 namespace fs = std::filesystem;
 
@@ -25,4 +25,4 @@ std::string FileHashes::Of(const fs::path& file) {
   return hash;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

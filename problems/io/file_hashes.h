@@ -8,7 +8,7 @@
 #include <mutex>
 #include <string>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Several threads may use one object at the same time.
 class FileHashes {
@@ -26,4 +26,4 @@ class FileHashes {
   std::map<std::string, Known> known_;  // by path
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

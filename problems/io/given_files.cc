@@ -15,7 +15,7 @@
 #include "problems/io/manifest.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -165,4 +165,4 @@ void RemoveFiles(const fs::path& folder, const std::vector<std::string>& names) 
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Identifies an output file of this program that no manifest names.
 struct FileMark {
@@ -55,4 +55,4 @@ std::vector<std::string> OldFiles(const std::filesystem::path& folder, const Giv
 // Removes the files, and folders that become empty.
 void RemoveFiles(const std::filesystem::path& folder, const std::vector<std::string>& names);
 
-}  // namespace semblance
+}  // namespace semblance::problems

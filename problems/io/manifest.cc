@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/io/manifest.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 std::vector<std::pair<std::string, std::string>> LibraryVersions() {
   return {{"ceres", SEMBLANCE_CERES_VERSION},
@@ -10,4 +10,4 @@ std::vector<std::pair<std::string, std::string>> LibraryVersions() {
           {"compiler", "g++ " __VERSION__}};
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

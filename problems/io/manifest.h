@@ -6,9 +6,9 @@
 #include <utility>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Name and version of each library that has a part in a result, and of the compiler.
 std::vector<std::pair<std::string, std::string>> LibraryVersions();
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -107,4 +107,4 @@ std::string PlainName(const std::filesystem::path& path) {
   return name.substr(0, name.find('.', 1));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

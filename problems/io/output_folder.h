@@ -9,7 +9,7 @@
 
 #include "surfaces/base/atomic_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The treatment of an output folder that is not empty. kReplaceFiles overwrites files of the same
 // name, one by one, and deletes nothing.
@@ -49,4 +49,4 @@ class OutputFolder {
 // The name of a file or folder without its endings: `head` for head.nii.gz, head.ply and head/.
 std::string PlainName(const std::filesystem::path& path);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -290,4 +290,4 @@ void StagedFolder::KeepAndFail(const std::string& why) {
                             root_.string(), why, (renamed ? kept : claim_.Folder()).string()));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/io/given_files.h"
 #include "problems/io/output_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Reserves a folder for this process by a lock. The system releases the lock when the process ends,
 // however it ends.
@@ -84,4 +84,4 @@ class StagedFolder {
   bool published_ = false;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 double BoxDiagonal(std::span<const Vec3> positions) {
@@ -239,4 +239,4 @@ std::string ResidualsPly(const ResidualColumns& columns) {
   return bytes;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

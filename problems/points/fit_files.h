@@ -7,7 +7,7 @@
 
 #include "problems/points/point_fit.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Throws InputError, naming a chord that would do, for a chord so fine that surface.ply would have
 // too many triangles. It looks only at a chord finer than `auto`, on a rough surface that is fitted
@@ -41,4 +41,4 @@ std::string ResidualsCsv(const ResidualColumns& columns);
 // sigma_mm, NAME and NAME_residual as floats.
 std::string ResidualsPly(const ResidualColumns& columns);
 
-}  // namespace semblance
+}  // namespace semblance::problems

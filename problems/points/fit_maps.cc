@@ -13,7 +13,7 @@
 #include "surfaces/hspline/patch_tree.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kGrid = 141;  // vertices along u and v: odd, so that Halved keeps the borders
@@ -211,4 +211,4 @@ std::string ToleranceText(const ToleranceReport& r) {
   return text;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "surfaces/hspline/hspline_shape.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Quantiles of the points' distances, outliers included (surfaces/base/quantile.h).
 struct DistanceQuantiles {
@@ -56,4 +56,4 @@ ToleranceReport CompareWithTolerance(const FitResult& fit, const AdaptivePlan& p
 // States in one sentence that the tolerance is met, or by how much and why it was missed.
 std::string ToleranceText(const ToleranceReport& report);
 
-}  // namespace semblance
+}  // namespace semblance::problems

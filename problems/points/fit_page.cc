@@ -19,7 +19,7 @@
 #include "problems/report/plain_names.h"
 #include "problems/report/report_kit.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Used by several parts of the page. None if no plan has a tolerance.
@@ -207,4 +207,4 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
   return ReportHtml(report);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -6,7 +6,7 @@
 
 #include "problems/points/point_fit.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Returns a page with the surface in a 3-D view and as a picture, the points' distances over it and
 // as a histogram, its refinement, and whether a tolerance was met. The pictures show a grid of the
@@ -15,4 +15,4 @@ namespace semblance {
 std::string FitPageHtml(const PointFitOptions& options, const PointSource& source,
                         const PointFit& result, int threads);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "problems/report/view/view_mesh.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -215,4 +215,4 @@ std::string FitScene(const FitGrid& grid) {
   return CollectScene("surface", std::move(scene));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include "problems/report/pictures/colour_map.h"
 #include "problems/points/fit_maps.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // From 0 to what 98 % of the grid's distances are below.
 ColourMap DistanceColours(const FitGrid& grid);
@@ -26,4 +26,4 @@ std::string DomainPng(const FitGrid& grid, const std::vector<FitCell>& cells);
 // The scene of the page's 3-D view (scene_json.h): the surface, plain and by distance.
 std::string FitScene(const FitGrid& grid);
 
-}  // namespace semblance
+}  // namespace semblance::problems

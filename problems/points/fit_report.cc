@@ -17,7 +17,7 @@
 #include "surfaces/base/quantile.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -316,4 +316,4 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
   return TerminalNotes(options, result, chord_mm);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "problems/points/point_fit.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 nlohmann::ordered_json AutoJson(const AutoReport& report);
 
@@ -45,4 +45,4 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
                                        const PointFit& result, OutputFolder& folder,
                                        const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -28,7 +28,7 @@
 #include "surfaces/mesh_files/read_stl.h"
 #include "surfaces/mesh_files/text_lines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr std::string_view kGzip = "\x1f\x8b";
@@ -454,4 +454,4 @@ PointFile ReadPointFile(const std::filesystem::path& path,
   return file;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "problems/points/point_table.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct PointFile {
   PointTable points;
@@ -31,4 +31,4 @@ struct PointFile {
 PointFile ReadPointFile(const std::filesystem::path& path,
                         std::span<const std::string> attributes = {});
 
-}  // namespace semblance
+}  // namespace semblance::problems

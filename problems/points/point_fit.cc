@@ -20,7 +20,7 @@
 #include "problems/points/fit_files.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // ------------------------------------------------------------- faults of the options
@@ -474,4 +474,4 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -23,7 +23,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline_query/tessellate.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class ResidualFile { kAuto, kCsv, kPly, kNone };
 constexpr auto EnumNames(ResidualFile) {
@@ -144,4 +144,4 @@ struct PointSource {
   std::string name, sha256;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 
 #include "surfaces/base/csv.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr std::array<std::string_view, kPointColumns> kNames = {
@@ -295,4 +295,4 @@ PointTable ParsePointTable(std::string_view text, std::string_view name,
   return is_plain ? plain.Take() : PointReader(text, name, attributes).Read();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

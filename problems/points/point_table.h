@@ -13,7 +13,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A further number of each point, which is fitted over the surface.
 struct PointAttribute {
@@ -95,4 +95,4 @@ class PlainPoints {
   PointTable table_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

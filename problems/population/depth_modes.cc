@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Eigen::Index;
@@ -187,4 +187,4 @@ std::vector<double> OnVertices(const DenseMesh& mesh, const std::vector<double>&
   return values;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

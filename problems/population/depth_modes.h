@@ -12,7 +12,7 @@
 #include "problems/population/subject_depths.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Values per cell i + columns j of the grid. A value is NaN if no subject has the cell; an sd needs
 // two subjects.
@@ -46,4 +46,4 @@ DenseMesh MakeDenseMesh(const DepthModes& dense);
 // The value of its cell at each vertex.
 std::vector<double> OnVertices(const DenseMesh& mesh, const std::vector<double>& by_cell);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 
 #include "problems/subject/sites.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Eigen::Index;
@@ -230,4 +230,4 @@ std::vector<PredictedSites> LeaveOneOut(const PopulationFile& file,
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/population/population_file.h"
 #include "problems/population/population_sample.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct PredictedDepth {
   int subject = -1;  // row of the sample
@@ -43,4 +43,4 @@ std::vector<PredictedSites> LeaveOneOut(const PopulationFile& file,
                                    const std::vector<CountedSubject>& subjects,
                                    const JointSample& sample);
 
-}  // namespace semblance
+}  // namespace semblance::problems

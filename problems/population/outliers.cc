@@ -8,7 +8,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Eigen::Index;
@@ -144,4 +144,4 @@ JointSample WithoutOutliers(JointSample sample, const std::vector<Outlier>& outl
   return sample;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include "problems/population/population_file.h"
 #include "problems/population/population_sample.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The number of subjects with a depth at a site from which outliers are searched there. The median
 // absolute deviation of fewer subjects is not reliable.
@@ -36,4 +36,4 @@ std::vector<Outlier> FindOutliers(const JointSample& sample, const JointNormal& 
 // Sets the depths of outlying sites, and all numbers of outlying subjects, to NaN.
 JointSample WithoutOutliers(JointSample sample, const std::vector<Outlier>& outliers);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -375,4 +375,4 @@ std::vector<NamedFile> NamedInputs(const PopulationFile& file) {
   return NamedFiles(needed);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "problems/config/config_binder.h"
 #include "problems/experiment/experiment.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A CT scan of a phantom, from which skull and skin are imported instead of the exact ones.
 struct PhantomScan {
@@ -301,4 +301,4 @@ PopulationPlan ReadPopulation(const std::filesystem::path& path);
 // The files that must exist: those of subjects that are not optional, tables and references.
 std::vector<NamedFile> NamedInputs(const PopulationFile& file);
 
-}  // namespace semblance
+}  // namespace semblance::problems

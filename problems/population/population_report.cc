@@ -17,7 +17,7 @@
 #include "problems/report/report_kit.h"
 #include "problems/subject/sites.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::string WayText(const std::string& name) {
@@ -248,4 +248,4 @@ std::string PopulationReport(const PopulationResult& result) {
   return ReportHtml(report);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -6,9 +6,9 @@
 
 #include "problems/population/population_result.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Makes an HTML page with its pictures inside. Nothing in it depends on time or machine.
 std::string PopulationReport(const PopulationResult& result);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -18,7 +18,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kMinSubjects = 3;  // as LeaveOneOut needs
@@ -366,4 +366,4 @@ void WriteSubjects(const std::vector<MeasuredSubject>& subjects, OutputFolder& f
   folder.Write("subjects.csv", SubjectsCsv(subjects));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

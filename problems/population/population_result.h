@@ -14,7 +14,7 @@
 #include "problems/population/population_run.h"
 #include "problems/population/population_sample.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct PopulationResult {
   PopulationFile file;
@@ -54,4 +54,4 @@ void WritePopulation(const PopulationResult& result, OutputFolder& folder);
 // reason of a failure.
 void WriteSubjects(const std::vector<MeasuredSubject>& subjects, OutputFolder& folder);
 
-}  // namespace semblance
+}  // namespace semblance::problems

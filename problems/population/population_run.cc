@@ -16,7 +16,7 @@
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -286,4 +286,4 @@ void RefuseOtherFolder(const PopulationPlan& plan, const fs::path& folder) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

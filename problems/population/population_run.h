@@ -12,7 +12,7 @@
 #include "problems/population/population_file.h"
 #include "problems/population/subject_depths.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct PopulationRunOptions {
   int jobs = 1;               // subjects at a time
@@ -69,4 +69,4 @@ std::vector<GatheredFrom> GatherSubjects(const PopulationPlan& plan,
 // or id. A folder that is empty or does not exist is accepted.
 void RefuseOtherFolder(const PopulationPlan& plan, const std::filesystem::path& folder);
 
-}  // namespace semblance
+}  // namespace semblance::problems

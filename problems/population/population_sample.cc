@@ -11,7 +11,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Eigen::Index;
@@ -220,4 +220,4 @@ TissueTable MakeTissueTable(const PopulationFile& file, const JointSample& sampl
   return table;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "problems/population/subject_depths.h"
 #include "problems/subject/tissue_table.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A measured subject that counts in the sample.
 struct CountedSubject {
@@ -45,4 +45,4 @@ JointNormal FitPopulation(const JointSample& sample, const SiteCorrelation& mode
 TissueTable MakeTissueTable(const PopulationFile& file, const JointSample& sample,
                             const JointNormal& joint);
 
-}  // namespace semblance
+}  // namespace semblance::problems

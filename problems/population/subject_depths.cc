@@ -22,7 +22,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -406,4 +406,4 @@ SubjectDepths ParseSubjectDepths(const Json& json) try {
   throw IoError(fmt::format("a subject's depths: {}", JsonFault(error)));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/population/population_file.h"
 #include "problems/subject/propose/reference_head.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct SiteDepth {
   std::string site;
@@ -50,4 +50,4 @@ nlohmann::ordered_json ToJson(const SubjectDepths& depths);
 // Throws IoError if the tree is not one that ToJson writes.
 SubjectDepths ParseSubjectDepths(const nlohmann::ordered_json& json);
 
-}  // namespace semblance
+}  // namespace semblance::problems

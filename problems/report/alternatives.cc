@@ -18,7 +18,7 @@
 #include "problems/report/run_folder.h"
 #include "problems/report/run_pictures.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -326,4 +326,4 @@ std::vector<std::string> RunAlternatives(const Experiment& experiment,
   return faults;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

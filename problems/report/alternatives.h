@@ -12,7 +12,7 @@
 #include "problems/experiment/stage_cache.h"
 #include "problems/run.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct NamedExperiment {
   std::string name;
@@ -47,4 +47,4 @@ std::vector<std::string> RunAlternatives(const Experiment& experiment,
                                          const RunResult& own, StageCache& cache,
                                          OutputFolder& folder, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -22,7 +22,7 @@
 #include "surfaces/mesh_files/read_ply.h"
 #include "surfaces/mesh_files/vtk_xml.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -206,4 +206,4 @@ std::string ExportedBytes(const fs::path& from, const ExportOptions& options) {
   return EncodeFace(ReadHSpline(from), options.extension, options.chord_mm, options.threads);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

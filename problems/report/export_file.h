@@ -6,7 +6,7 @@
 #include <optional>
 #include <string>
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ExportOptions {
   std::string extension;           // of the wanted file, in upper or lower case
@@ -26,4 +26,4 @@ struct ExportOptions {
 // file is missing or is not that of a run.
 std::string ExportedBytes(const std::filesystem::path& from, const ExportOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::problems

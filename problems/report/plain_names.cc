@@ -10,7 +10,7 @@
 
 #include "problems/subject/sites.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 const std::map<std::string_view, std::string_view>& Words() {
@@ -137,4 +137,4 @@ std::string Counted(long long count, std::string_view noun, std::string_view plu
                                   plural.empty() ? fmt::format("{}s", noun) : std::string(plural));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -5,7 +5,7 @@
 #include <string>
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 // Words for a key of result.json, with its unit in brackets: "dowel_rms_mm" is "RMS distance of the
 // depth markers (mm)". An unknown key is spelled with blanks instead of underscores, its unit last.
@@ -25,4 +25,4 @@ std::string WordsOfSite(std::string_view site);
 // "1 subject", "2 subjects". `plural` is needed if the noun does not form its plural with an s.
 std::string Counted(long long count, std::string_view noun, std::string_view plural = "");
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -4,7 +4,7 @@
 
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 std::string_view ReportStyle();        // report.css
 std::string_view ReportPageScript();   // report_page.js
@@ -12,4 +12,4 @@ std::string_view ReportViewScript();   // report_view.js and the view_*.js files
 std::string_view ReportPartsScript();  // the view_*.js files alone, for other pages
 std::string_view ThreeScript();        // three.js; empty if the program was built without it
 
-}  // namespace semblance
+}  // namespace semblance::problems

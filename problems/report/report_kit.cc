@@ -16,7 +16,7 @@
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::string MimeType(const ReportImage& image) {
@@ -394,4 +394,4 @@ std::string ReportHtml(const Report& report) {
   return html + Script(ReportPageScript()) + "</body>\n</html>\n";
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

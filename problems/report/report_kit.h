@@ -14,7 +14,7 @@
 #include "problems/report/pictures/colour_map.h"
 #include "problems/report/plots/svg_plot.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // All text of these structs is plain text. ReportHtml escapes it.
 struct ReportTile {
@@ -98,4 +98,4 @@ std::vector<std::string> FaultNotes(const std::vector<std::string>& faults);
 // has no alt text, and for a table row that is not as long as the header.
 std::string ReportHtml(const Report& report);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "fitting/relaxation/dowel_mesh.h"
 #include "problems/subject/sites.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -395,4 +395,4 @@ Json ResultJson(const Experiment& experiment, const RunResult& result) {
   return json;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

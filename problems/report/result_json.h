@@ -16,7 +16,7 @@
 #include "problems/experiment/step_clock.h"
 #include "problems/run.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // result.json of a run: its metrics and counts.
 nlohmann::ordered_json ResultJson(const Experiment& experiment, const RunResult& result);
@@ -50,4 +50,4 @@ nlohmann::ordered_json StepsToJson(const FitResult& fit);
 std::string TimingJson(const std::vector<StepTime>& times,
                        std::optional<double> cpu_s = std::nullopt);
 
-}  // namespace semblance
+}  // namespace semblance::problems

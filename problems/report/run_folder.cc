@@ -22,7 +22,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -195,4 +195,4 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
   folder.Write("manifest.json", ManifestJson(provenance, folder));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "problems/experiment/experiment.h"
 #include "problems/run.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Every file that a run may write, including its alternatives (given_files.h).
 inline constexpr std::array<std::string_view, 19> kRunFiles = {
@@ -26,4 +26,4 @@ inline constexpr std::array<std::string_view, 19> kRunFiles = {
 void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolder& folder,
               const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr std::array kViews = {View::kFront, View::kThreeQuarter, View::kSide};
@@ -233,4 +233,4 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
   folder.Write("pictures/overview.png", EncodePng(ContactSheet(overview)));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

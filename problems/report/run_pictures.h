@@ -10,7 +10,7 @@
 #include "problems/subject/mirror.h"
 #include "problems/run.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 ColourMap DepthColours();  // 0 to 25 mm
 ColourMap ErrorColours();  // -8 to 8 mm
@@ -31,4 +31,4 @@ Scene HeadScene(const RunResult& result);
 // report (run_report.h), not in the pictures.
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -18,7 +18,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -530,4 +530,4 @@ void WriteReport(OutputFolder& folder) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

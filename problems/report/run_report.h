@@ -4,10 +4,10 @@
 
 #include "problems/io/output_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Writes report.html from result.json, resolved.yaml, dowels.csv, the pictures and, if it exists,
 // scene.json of the folder. Throws IoError if a required file is missing or cannot be read.
 void WriteReport(OutputFolder& folder);
 
-}  // namespace semblance
+}  // namespace semblance::problems

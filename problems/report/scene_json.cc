@@ -17,7 +17,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -302,4 +302,4 @@ SceneCollection CollectScenes(const std::vector<SceneText>& scenes, std::size_t 
   return {all.dump(), static_cast<int>(all["scenes"].size())};
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

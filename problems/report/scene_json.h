@@ -8,7 +8,7 @@
 
 #include "problems/run.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // {label, facts, maps, layers, blobs} of one run. Layers from inner to outer: skull, dowels (base,
 // tip, the fitted face's point, depth and residual), depth on the skull's shell, first and
@@ -34,4 +34,4 @@ SceneCollection CollectScenes(const std::vector<SceneText>& scenes, std::size_t 
 // The same for a single scene that is still JSON.
 std::string CollectScene(const std::string& label, nlohmann::ordered_json scene);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct Definition {
@@ -169,4 +169,4 @@ std::string SitePage(std::span<const TissueTable> tables, const std::string& pic
          Rows(FurtherSites(), tables) + "\n## The tables\n\n" + TableList(tables) + kAfterTables;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

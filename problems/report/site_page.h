@@ -8,7 +8,7 @@
 
 #include "problems/subject/tissue_table.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Makes the page with the sites of sites.h in their order. `picture` is the name of the picture's
 // file in the same folder. The tables are named in the given order and explained below. The same
@@ -19,4 +19,4 @@ std::string SitePage(std::span<const TissueTable> tables, const std::string& pic
 // for a landmark that is not in sites.h.
 std::string_view SiteDefinition(std::string_view landmark);
 
-}  // namespace semblance
+}  // namespace semblance::problems

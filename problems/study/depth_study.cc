@@ -15,7 +15,7 @@
 #include "surfaces/base/csv.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -291,4 +291,4 @@ void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputF
   folder.Write("timing.json", TimingJson(result.times));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "problems/report/pictures/colour_map.h"
 #include "problems/experiment/depth_comparison.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct DepthResult {
   std::shared_ptr<const DepthStage> stage;
@@ -66,4 +66,4 @@ void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputF
 // Writes the main numbers as a few lines of text for people.
 std::string DepthText(const DepthResult& result);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/tessellate.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -179,4 +179,4 @@ Json IdentifyResultJson(const Experiment& experiment, const IdentifyResult& resu
   return json;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/run.h"
 #include "problems/study/study_plan.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The distance of a probe to its person and to the others, by one measure.
 struct Match {
@@ -49,4 +49,4 @@ IdentifyResult Identify(const Experiment& experiment, const std::vector<GalleryE
 nlohmann::ordered_json IdentifyResultJson(const Experiment& experiment,
                                           const IdentifyResult& result);
 
-}  // namespace semblance
+}  // namespace semblance::problems

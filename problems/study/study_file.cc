@@ -16,7 +16,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Combines each row of `left` with each row of `right`. The right row varies fastest.
@@ -209,4 +209,4 @@ void ApplySetting(const OptionSetting& setting, const ConfigNode& defaults, Conf
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

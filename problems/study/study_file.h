@@ -32,7 +32,7 @@
 #include "problems/config/config_tree.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Values by option path ("interp", "seeds.weight"), and lists of them.
 using OptionValues = ConfigMap<ConfigNode>;
@@ -236,4 +236,4 @@ std::vector<StudyRow> MakeStudyRows(const StudyFile& study, ConfigErrors& errors
 void ApplySetting(const OptionSetting& setting, const ConfigNode& defaults, ConfigNode& tree,
                   ConfigErrors& errors);
 
-}  // namespace semblance
+}  // namespace semblance::problems

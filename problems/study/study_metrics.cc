@@ -20,7 +20,7 @@
 #include "problems/study/identify_study.h"
 #include "problems/subject/sites.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -264,4 +264,4 @@ Preference PreferenceFor(const std::string& metric, std::optional<Better> given)
   return {.better = given.value_or(DefaultBetter(metric)), .target = StatedShare(metric).value_or(0)};
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

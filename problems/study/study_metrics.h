@@ -10,7 +10,7 @@
 
 #include "problems/study/study_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Returns "" if a trial of the job can have the metric, else a complaint with the nearest name.
 std::string ComplaintAboutMetric(const std::string& metric, StudyJob job);
@@ -49,4 +49,4 @@ struct Preference {
 // the stated share of a coverage, else 0.
 Preference PreferenceFor(const std::string& metric, std::optional<Better> given = std::nullopt);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "problems/study/study_metrics.h"
 #include "surfaces/base/encoding.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -457,4 +457,4 @@ std::vector<bool> SelectTrials(const StudyPlan& plan, const std::string& conditi
   return chosen;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "problems/experiment/experiment.h"
 #include "problems/study/study_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // One trial: the experiment that a subject and a row of settings make.
 struct StudyTrial {
@@ -58,4 +58,4 @@ StudyPlan ReadStudy(const std::filesystem::path& file,
 // InputError as ValueFilter does, and if the condition holds for no trial.
 std::vector<bool> SelectTrials(const StudyPlan& plan, const std::string& condition);
 
-}  // namespace semblance
+}  // namespace semblance::problems

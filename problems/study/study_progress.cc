@@ -8,7 +8,7 @@
 
 #include "problems/config/terminal_text.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::string Duration(double seconds) {
@@ -77,4 +77,4 @@ void StudyProgress::operator()(const StudyEta& eta, const std::string& trial) {
   std::fflush(stream_);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

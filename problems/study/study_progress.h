@@ -8,7 +8,7 @@
 
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The state of a running study. elapsed_s counts from the start of this call, when
 // `finished_before` trials had finished.
@@ -46,4 +46,4 @@ class StudyProgress {
   Clock::time_point last_ = Clock::now();
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

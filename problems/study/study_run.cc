@@ -93,7 +93,7 @@
 #include "problems/study/trial_folder.h"
 #include "surfaces/base/atomic_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -330,7 +330,7 @@ class StudyRunner {
 
   Files RunFace(const StudyTrial& trial, double cpu_before_s, Json& json) {
     auto result = std::make_shared<const RunResult>(
-        semblance::Run(WithoutUnusedBust(trial.experiment), Quiet(), &cache_));
+        problems::Run(WithoutUnusedBust(trial.experiment), Quiet(), &cache_));
     SetStatus(result->Faults(), json);
     json["result"] = ResultJson(trial.experiment, *result);
     return FilesOfRun(trial, result, ThreadCpu_s() - cpu_before_s);
@@ -509,4 +509,4 @@ std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<
   return not_taken;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

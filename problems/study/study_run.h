@@ -13,7 +13,7 @@
 #include "problems/study/study_progress.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The finished trials that run again: none; those that failed; also the unusable ones; all.
 enum class Rerun { kNothing, kFailed, kUnusable, kAll };
@@ -65,4 +65,4 @@ StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder
 std::vector<std::string> GatherTrials(const std::filesystem::path& folder,
                                       const std::vector<std::filesystem::path>& others);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "problems/io/output_folder.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -62,4 +62,4 @@ fs::path SubmitStudy(const SubmitOptions& options) {
   return script;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 
 struct SubmitOptions {
   std::filesystem::path program;    // path of semblance on the nodes
@@ -28,4 +28,4 @@ std::string SubmitScript(const SubmitOptions& options);
 // stays.
 std::filesystem::path SubmitStudy(const SubmitOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -20,7 +20,7 @@
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -305,4 +305,4 @@ std::string SummaryCsv(const StudyResults& results) {
   return csv.Text();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/study/study_metrics.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct TrialRow {
   std::string id, subject;
@@ -70,4 +70,4 @@ std::string TrialsCsv(const StudyResults& results);
 // interval of the mean over subjects.
 std::string SummaryCsv(const StudyResults& results);
 
-}  // namespace semblance
+}  // namespace semblance::problems

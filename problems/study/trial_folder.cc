@@ -14,7 +14,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/json_text.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -252,4 +252,4 @@ std::optional<TrialNumbers> ReadTrialNumbers(std::string_view text) {
   return Json::sax_parse(text, &handler) ? std::optional(handler.TakeNumbers()) : std::nullopt;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

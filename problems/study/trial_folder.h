@@ -10,7 +10,7 @@
 #include <string_view>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 
 std::filesystem::path TrialFolder(const std::filesystem::path& study, const std::string& id);
 
@@ -55,4 +55,4 @@ struct TrialNumbers {
 // id, status or reason that is not a text.
 std::optional<TrialNumbers> ReadTrialNumbers(std::string_view text);
 
-}  // namespace semblance
+}  // namespace semblance::problems

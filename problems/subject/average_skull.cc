@@ -14,7 +14,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct AverageLandmark {
@@ -187,4 +187,4 @@ SkullSites CompleteSites(std::span<const SitePoint> sites) {
   return complete;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

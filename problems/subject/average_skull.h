@@ -13,7 +13,7 @@
 #include "problems/subject/landmarks.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The point of a standard site on the average skull's bone, in mm. Nasion is the origin, the axes
 // are LPS, the face looks to -y. The points are the mean of three adults (CThead, Visible Human
@@ -56,4 +56,4 @@ struct SkullSites {
 // Throws as FitAverageSkull.
 SkullSites CompleteSites(std::span<const SitePoint> sites);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Lays a point on the left side of the head.
@@ -246,4 +246,4 @@ std::vector<std::string> ConditionDepths(const TissueOptions& options,
   return notes;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

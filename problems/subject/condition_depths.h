@@ -13,7 +13,7 @@
 #include "problems/subject/dowel_depths.h"
 #include "problems/subject/landmarks.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The correlations of the model, with one row and one column per name: the formula of
 // SiteCorrelation with distances on the average skull. Sites that the average skull lacks correlate
@@ -46,4 +46,4 @@ std::vector<std::string> ConditionDepths(const TissueOptions& options,
 // facts known about this person, and not to all people.
 bool IsConditioned(const TissueOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::problems

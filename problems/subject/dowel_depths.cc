@@ -13,7 +13,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Notes for people, of which only those about certain sites are kept.
@@ -385,4 +385,4 @@ std::vector<std::filesystem::path> TissueTableFiles(const TissueOptions& options
   return tables;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

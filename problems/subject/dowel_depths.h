@@ -16,7 +16,7 @@
 #include "problems/subject/tissue_table.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class DepthSource { kTable, kMeasured };
 
@@ -219,4 +219,4 @@ std::string FindSetKey(const TissueOptions& options, const std::string& site);
 // The files of the tables that the options name and use, in the order in which they are searched.
 std::vector<std::filesystem::path> TissueTableFiles(const TissueOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "surfaces/base/farthest_first.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Keeps the first n of `order`.
@@ -273,4 +273,4 @@ Vec3 AveragedNormal(const TriMesh& mesh, int first, const Sphere& ball) {
   return sum.normalized();  // zero stays zero
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

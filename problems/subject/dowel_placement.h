@@ -16,7 +16,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct KeepAll {
   static constexpr std::string_view kName = "all";
@@ -166,4 +166,4 @@ std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
 // area counts as far as it lies inside the ball, to some percent. Zero if there is no such area.
 Vec3 AveragedNormal(const TriMesh& mesh, int first, const Sphere& ball);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr char kForms[] = "write [x, y, z] in mm, a landmark such as go_l, or several, as [n, rhi]";
@@ -115,4 +115,4 @@ Vec3 PointNear(const std::string& site, const ConfigNode& near, std::span<const 
   return sum / static_cast<double>(place.landmarks.size());
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

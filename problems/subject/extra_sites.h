@@ -14,7 +14,7 @@
 #include "problems/subject/average_skull.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ExtraSite {
   std::optional<std::array<double, 2>> uv;
@@ -82,4 +82,4 @@ bool IsHeld(const ExtraSites& sites, const std::string& site);
 // if a landmark of `near` is neither given nor standard.
 Vec3 PointNear(const std::string& site, const ConfigNode& near, std::span<const SitePoint> given);
 
-}  // namespace semblance
+}  // namespace semblance::problems

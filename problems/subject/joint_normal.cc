@@ -12,7 +12,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Eigen::Index;
@@ -298,4 +298,4 @@ JointNormal FitJointNormal(const JointSample& sample, const MatrixXd& target,
   return joint;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 
 struct JointNormal {
   std::vector<std::string> names;  // n, each once
@@ -78,4 +78,4 @@ double ComputeShrinkage(const JointSample& sample, const Eigen::MatrixXd& target
 JointNormal FitJointNormal(const JointSample& sample, const Eigen::MatrixXd& target,
                            std::optional<double> shrinkage = std::nullopt);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Median residual up to which sites can be those of a skull. The three measured skulls differ by up
@@ -339,4 +339,4 @@ LandmarkMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& s
   return MistakeSearch(file, skull, query, options).Run();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

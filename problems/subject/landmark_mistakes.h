@@ -9,7 +9,7 @@
 #include "problems/subject/dowel_placement.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct LandmarkMistakes {
   std::vector<std::string> errors;  // one line each; a subject with one cannot be used
@@ -41,4 +41,4 @@ double SamePoint_mm(const Box3& extent);
 LandmarkMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
                                       const MeshQuery& query, const PlaceOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::problems

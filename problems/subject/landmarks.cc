@@ -11,7 +11,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Normals in files are rounded to a few digits; 1 % still rejects a vector that is no unit normal.
@@ -135,4 +135,4 @@ LandmarkFile InLpsMm(LandmarkFile file) {
   return file;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

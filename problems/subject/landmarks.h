@@ -14,7 +14,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class LengthUnit { kMillimetre, kCentimetre, kInch, kMetre };
 constexpr auto EnumNames(LengthUnit) {
@@ -147,4 +147,4 @@ void CheckLandmarks(std::span<const Landmark> landmarks, const std::string& file
 // enums.
 LandmarkFile InLpsMm(LandmarkFile file);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::vector<SitePoint> SitesOfJaw(std::span<const SitePoint> sites, bool mandible) {
@@ -186,4 +186,4 @@ std::vector<std::string> AddMandible(const MandibleOptions& options, TriMesh man
   return notes;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // True if the site lies on the mandible.
 bool IsOfMandible(std::string_view site);
@@ -122,4 +122,4 @@ double OpeningForBite_deg(const Hinge& hinge, const Vec3& upper, const Vec3& low
 std::vector<std::string> AddMandible(const MandibleOptions& options, TriMesh mandible,
                                      TriMesh& skull, LandmarkFile& landmarks);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Two points that mirror each other. A site in the midline is its own twin.
@@ -307,4 +307,4 @@ std::vector<std::string> PrepareMirrored(const MirrorOptions& options, TriMesh& 
   return notes;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class BoneOrigin : std::uint8_t {
   kObserved,  // in the scan
@@ -101,4 +101,4 @@ std::vector<std::string> PrepareMirrored(const MirrorOptions& options, TriMesh& 
                                          std::vector<BoneOrigin>& origin, LandmarkFile& landmarks,
                                          int threads);
 
-}  // namespace semblance
+}  // namespace semblance::problems

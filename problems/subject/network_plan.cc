@@ -12,7 +12,7 @@
 
 #include "problems/config/config.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Area = std::array<std::string, 3>;
@@ -163,4 +163,4 @@ NetworkPlan WithoutSites(NetworkPlan plan, const std::set<std::string>& gone,
   return plan;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 template <class Visitor>
 void Fields(Visitor& visit, NetworkPlan& plan) {
@@ -41,4 +41,4 @@ NetworkPlan ReadNetworkPlan(const std::filesystem::path& path);
 NetworkPlan WithoutSites(NetworkPlan plan, const std::set<std::string>& gone,
                          const std::map<std::string, Vec3>& points);
 
-}  // namespace semblance
+}  // namespace semblance::problems

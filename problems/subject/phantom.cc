@@ -17,7 +17,7 @@
 #include "surfaces/base/random.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Bone and tissue of an average head at a landmark; the left one of a pair.
@@ -298,4 +298,4 @@ LandmarkFile PhantomLandmarks(const Phantom& phantom, std::uint64_t random_seed)
   return file;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

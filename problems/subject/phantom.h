@@ -13,7 +13,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class PhantomBone { kSmooth, kLikePeople };
 constexpr auto EnumNames(PhantomBone) {
@@ -78,4 +78,4 @@ Phantom MakePhantom(const PhantomOptions& options);
 // and the depths along them. `random_seed` only serves to name the subject.
 LandmarkFile PhantomLandmarks(const Phantom& phantom, std::uint64_t random_seed);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr double kAirHu = -1000, kTissueHu = 40, kBoneHu = 1000, kPlasticHu = 100;
@@ -143,4 +143,4 @@ CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options
   return volume;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

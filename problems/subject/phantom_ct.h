@@ -7,7 +7,7 @@
 #include "problems/subject/phantom.h"
 #include "problems/io/volumes/ct_volume.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Lost bone: a ball around a site.
 struct BoneDefect {
@@ -43,4 +43,4 @@ class LostBone {
   double radius_mm_ = -1;  // an empty ball
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

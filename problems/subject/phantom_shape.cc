@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct Body {
@@ -244,4 +244,4 @@ double PhantomRelief::Thickness(const Vec3& direction, double smooth_mm) const {
   return kMinThickness_mm + kRounding_mm * rounded;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

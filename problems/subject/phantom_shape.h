@@ -10,7 +10,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The common start of all rays, in mm, before the surface is moved to put nasion at the origin.
 inline const Vec3 kPhantomCentre(0, 75, -20);
@@ -113,4 +113,4 @@ struct RoughnessOptions {
 };
 WaveSum DrawRoughness(const RoughnessOptions& options, Random& random);
 
-}  // namespace semblance
+}  // namespace semblance::problems

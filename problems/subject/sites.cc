@@ -13,7 +13,7 @@
 
 #include "problems/config/spelling_suggestion.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct StandardLandmark {
@@ -284,4 +284,4 @@ std::vector<std::string> OtherSiteNames(std::string_view landmark) {
   return names;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 
 #include "interp/dowels/dowel.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct Site {
   std::string code;       // with side, e.g. "g", "go_l"
@@ -70,4 +70,4 @@ NamedSite FindSiteByName(std::string_view name);
 // Further names of a landmark ("go"), besides its code, number and printed name.
 std::vector<std::string> OtherSiteNames(std::string_view landmark);
 
-}  // namespace semblance
+}  // namespace semblance::problems

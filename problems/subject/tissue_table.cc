@@ -13,7 +13,7 @@
 #include "problems/config/config.h"
 #include "problems/subject/sites.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr char kPooled[] = "adult";
@@ -289,4 +289,4 @@ std::vector<std::string> TableWarnings(const TissueTable& table) {
   return warnings;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

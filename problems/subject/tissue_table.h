@@ -17,7 +17,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class Sex { kMale, kFemale };
 enum class Build { kEmaciated, kNormal, kObese };
@@ -214,4 +214,4 @@ std::vector<std::string> UnorderedLandmarks(const TissueTable& table, Sex sex,
 // published tables contain such rows and cells.
 std::vector<std::string> TableWarnings(const TissueTable& table);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -20,7 +20,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 namespace fs = std::filesystem;
@@ -225,4 +225,4 @@ void SyncFolder(const fs::path& folder) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

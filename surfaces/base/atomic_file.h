@@ -7,7 +7,9 @@
 #include <string>
 #include <string_view>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // kSynced files survive a power failure. kUnsynced files survive the end of the process, but may be
 // empty after a power failure. kUnsynced saves two waits for the disk. Use it for files that are
@@ -35,4 +37,4 @@ void SweepTemporaryFiles(const std::filesystem::path& folder);
 // Makes renames in `folder` survive a power failure, if the file system supports it.
 void SyncFolder(const std::filesystem::path& folder);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

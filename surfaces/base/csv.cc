@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr std::string_view kBlanks = " \t";
@@ -212,4 +212,4 @@ void CsvWriter::EndRow() {
   text_ += '\n';
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -11,7 +11,9 @@
 #include <string_view>
 #include <vector>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // Separator and decimal sign. In countries with a decimal comma, spreadsheets separate by
 // semicolons.
@@ -111,4 +113,4 @@ class CsvWriter {
   std::size_t cells_ = 0;  // cells in the row so far
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -13,7 +13,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr std::string_view kBase64Digits =
@@ -201,4 +201,4 @@ std::string Unpacked(std::string_view bytes, const std::string& name) {
   return unpacked;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

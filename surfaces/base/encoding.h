@@ -11,7 +11,9 @@
 #include <string>
 #include <string_view>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // Encodes bytes as Base64 with padding (RFC 4648), for JSON, XML and HTML.
 std::string Base64(std::string_view bytes);
@@ -68,4 +70,4 @@ void AppendRaw(std::string& bytes, T value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

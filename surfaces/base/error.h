@@ -6,7 +6,9 @@
 #include <stdexcept>
 #include <string>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // Base of all errors that a user can correct. The message states the place, the fault, what is
 // allowed, and the remedy.
@@ -45,4 +47,4 @@ class Cancelled : public std::runtime_error {
   Cancelled() : std::runtime_error("cancelled") {}
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

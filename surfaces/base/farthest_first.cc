@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <limits>
 
-namespace semblance {
+namespace semblance::surfaces {
 
 std::vector<std::size_t> FarthestFirst(std::span<const Vec3> points, std::size_t first,
                                        std::size_t count, Coincident coincident) {
@@ -24,4 +24,4 @@ std::vector<std::size_t> FarthestFirst(std::span<const Vec3> points, std::size_t
   return order;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

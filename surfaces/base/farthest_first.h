@@ -8,7 +8,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Treatment of points that coincide with chosen ones: chosen last, or never.
 enum class Coincident { kTaken, kLeftOut };
@@ -20,4 +20,4 @@ std::vector<std::size_t> FarthestFirst(std::span<const Vec3> points, std::size_t
                                        std::size_t count,
                                        Coincident coincident = Coincident::kTaken);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

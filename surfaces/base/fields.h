@@ -28,7 +28,9 @@
 #include <limits>
 #include <string_view>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 struct FieldInfo {
   std::string_view name;
@@ -55,4 +57,4 @@ struct AutoOr {
   constexpr operator T() const { return value; }  // NOLINT
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <limits>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 using Vec2 = Eigen::Vector2d;
 using Vec3 = Eigen::Vector3d;
@@ -50,4 +52,4 @@ double DistanceToSegment(const Vec& p, const Vec& a, const Vec& b) {
   return (p - a - t * ab).norm();
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // The library compares each new entry of an object with all others, which takes quadratic time.
@@ -67,9 +67,9 @@ nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces
 
-namespace semblance::json_parts {
+namespace semblance::surfaces::json_parts {
 namespace {
 
 double DoubleFromJson(const Json& number) {
@@ -143,4 +143,4 @@ Vec3 VecFromJson(const Json& row, std::size_t first) {
           DoubleFromJson(row.at(first + 2))};
 }
 
-}  // namespace semblance::json_parts
+}  // namespace semblance::surfaces::json_parts

@@ -11,7 +11,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 inline constexpr int kDeepestJson = 64;  // nested lists and objects
 
@@ -25,11 +25,11 @@ nlohmann::ordered_json ParseJson(std::string_view text, std::string_view name);
 // The message of a JSON library exception, without the exception's own name and number.
 std::string JsonFault(const std::exception& error);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces
 
 // Parts of strict readers of JSON files. All throw IoError with the end of a sentence, to which the
 // caller adds the file's name.
-namespace semblance::json_parts {
+namespace semblance::surfaces::json_parts {
 
 using Json = nlohmann::ordered_json;
 
@@ -50,4 +50,4 @@ const Json& ListFromJson(const Json& json, const char* key);
 // Reads the three numbers row[first], row[first + 1] and row[first + 2].
 Vec3 VecFromJson(const Json& row, std::size_t first);
 
-}  // namespace semblance::json_parts
+}  // namespace semblance::surfaces::json_parts

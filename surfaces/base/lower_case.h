@@ -6,7 +6,9 @@
 #include <cctype>
 #include <string>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // Changes ASCII letters to lower case and leaves all other bytes unchanged.
 inline std::string LowerCase(std::string text) {
@@ -15,4 +17,4 @@ inline std::string LowerCase(std::string text) {
   return text;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

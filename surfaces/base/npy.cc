@@ -15,7 +15,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 static_assert(std::endian::native == std::endian::little);
@@ -175,4 +175,4 @@ NpyArray ReadNpy(const std::filesystem::path& path) {
   return ParseNpy(ReadFileBytes(path), path.string());
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,7 +7,9 @@
 #include <string_view>
 #include <vector>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 struct NpyArray {
   std::vector<std::size_t> shape;
@@ -23,4 +25,4 @@ NpyArray ParseNpy(std::string_view bytes, std::string_view name);
 // Throws IoError if the file cannot be read, and InputError as ParseNpy does.
 NpyArray ReadNpy(const std::filesystem::path& path);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

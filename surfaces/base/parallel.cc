@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 void RunBlock(std::size_t begin, std::size_t end, const std::function<void(std::size_t)>& body,
@@ -54,4 +54,4 @@ void ParallelFor(std::size_t count, int threads, std::size_t block,
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <functional>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // Calls body(i) once for each i in [0, count), on up to `threads` threads (>= 1), in blocks of
 // `block` (>= 1) indices. body(i) must write only to data of index i; then the result does not
@@ -13,4 +15,4 @@ namespace semblance {
 void ParallelFor(std::size_t count, int threads, std::size_t block,
                  const std::function<void(std::size_t)>& body);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -4,7 +4,9 @@
 
 #include <cstdint>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 enum class PointRole : std::uint8_t {
   kScattered,  // one of many measured points, without a name
@@ -13,4 +15,4 @@ enum class PointRole : std::uint8_t {
   kSeed,       // an extra dowel, sampled from the first (implicit) face
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

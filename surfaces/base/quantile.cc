@@ -6,7 +6,7 @@
 #include <limits>
 #include <numeric>
 
-namespace semblance {
+namespace semblance::surfaces {
 
 double ArithmeticMean(std::span<const double> values) {
   return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
@@ -71,4 +71,4 @@ double UpperMedian(std::vector<double>& values) {
   return *middle;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -5,7 +5,9 @@
 #include <span>
 #include <vector>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // Sum in index order, divided by the count; NaN for no values.
 double ArithmeticMean(std::span<const double> values);
@@ -34,4 +36,4 @@ double Quantile(std::vector<double>& values, double share);
 // computed from it is attained. values: at least one, no NaN. Reorders the values.
 double UpperMedian(std::vector<double>& values);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The C++ standard fixes the bits of the 64-bit Mersenne Twister, but not the results of its
 // distributions. Hence the draws are computed here. Each comment ends with the number of 64-bit
@@ -68,4 +68,4 @@ class Random {
   std::mt19937_64 engine_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct Event {
   std::string step;                                            // e.g. "polygonize"
@@ -37,4 +37,4 @@ struct RunContext {
   }
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "surfaces/base/layers.h"
+
 // Compiles functions also for newer processors and chooses a version when the program starts. All
 // versions give the same bits, because no operations are contracted (-ffp-contract=off). The build
 // option SEMBLANCE_WIDEST_BITS leaves out the widest version, so that a test can compare the bits
@@ -40,7 +42,7 @@
 // Forces inlining, so that each version compiles the function for its own instruction set.
 #define SEMBLANCE_INLINE [[gnu::always_inline]] inline
 
-namespace semblance {
+namespace semblance::surfaces {
 
 using Wide = double __attribute__((vector_size(32)));
 // Suited to sums and products anywhere. Comparisons belong in functions for AVX-512 alone
@@ -125,4 +127,4 @@ SEMBLANCE_INLINE N InversePowerFromSquare(const N& square, double power, int who
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using Eigen::MatrixXd;
@@ -143,4 +143,4 @@ ThinPlate FitThinPlate(std::span<const Vec3> from, std::span<const Vec3> to,
   return plate;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

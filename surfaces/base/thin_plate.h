@@ -8,7 +8,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct ThinPlateOptions {
   // Weight of the bending energy relative to the squared misfit of the points, in mm, >= 0. With 0
@@ -39,4 +39,4 @@ struct ThinPlate {
 ThinPlate FitThinPlate(std::span<const Vec3> from, std::span<const Vec3> to,
                        std::span<const double> weights = {}, const ThinPlateOptions& options = {});
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -29,7 +29,7 @@
 #include "surfaces/mesh/half_edge_mesh.h"
 #include "surfaces/mesh/neighbour_order.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // The largest error of a sound collapse, as a share of the square root of the area around it.
@@ -590,4 +590,4 @@ DecimateResult Decimate(const TriMesh& mesh, const DecimateOptions& options) {
   return {Submesh(left.mesh, std::vector<bool>(left.mesh.triangles.size(), true)), left.summary};
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -9,7 +9,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct DecimateOptions {
   int target_triangles = 4;  // collapses stop at this number; at least 4
@@ -49,4 +49,4 @@ struct DecimateResult {
 // InputError if an option is out of range or a point is not finite.
 DecimateResult Decimate(const TriMesh& mesh, const DecimateOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

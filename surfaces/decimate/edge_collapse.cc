@@ -7,7 +7,7 @@
 
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using OpenMesh::HalfedgeHandle;
@@ -379,4 +379,4 @@ void MeasureCollapse(const CollapseGeometry& collapse, CollapseError& error) {
   sheets.AssignSamples(error);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

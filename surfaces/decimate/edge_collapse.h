@@ -9,7 +9,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/half_edge_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The triangles around an edge from `keep` to `gone`. Outer triangle i is (apex, ring[i],
 // ring[i + 1]); its apex is keep or gone, and after the collapse the merged vertex. The one or two
@@ -68,4 +68,4 @@ struct CollapseError {
 // Overwrites `error` and reuses its memory.
 void MeasureCollapse(const CollapseGeometry& collapse, CollapseError& error);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -8,7 +8,7 @@
 
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // More rounds gain little: two lower the RMS by an eighth and more (docs/implicit.md).
@@ -187,4 +187,4 @@ void OriginalVertices::UpdateDistances(const std::vector<std::int32_t>& triangle
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Keeps a reference to the original mesh. The remaining triangles keep their original indices.
 class OriginalVertices {
@@ -49,4 +49,4 @@ class OriginalVertices {
   std::vector<std::int32_t> last_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

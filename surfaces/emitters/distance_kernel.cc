@@ -7,7 +7,7 @@
 
 #include "surfaces/base/simd.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // A point relative to the lanes from `first` on.
@@ -267,4 +267,4 @@ double EmitByDistance(const DistanceEmitterLanes& batch, int lane, const Vec3& p
   return Emit<double>(batch, lane, p, falloff, falloff.whole);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -11,7 +11,7 @@
 #include "surfaces/emitters/emitter.h"
 #include "surfaces/emitters/emitter_triangle.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Eight triangles, one per lane, each in the plane from which it emits: the first corner at the
 // origin, the second on the x axis, the third at y > 0. A lane that was not set emits nothing. One
@@ -94,4 +94,4 @@ double SumByDistance(std::span<const DistanceEmitterLanes> lanes,
                      std::span<const std::int32_t> which, std::span<const ReachLanes> reaches,
                      const Vec3& p, const Falloff& falloff, std::int64_t& reaching);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,7 +7,7 @@
 
 #include "surfaces/base/simd.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Squared distance along one axis between [low, high] and center +- half.
@@ -131,4 +131,4 @@ SEMBLANCE_WIDE void UpperBoundInBox(const EmissionUpperBound& lanes, const Vec3&
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 #include "surfaces/emitters/emitter_triangle.h"
 #include "surfaces/emitters/flat_kernel.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // A box and the ball around it.
 struct BoxView {
@@ -47,4 +47,4 @@ struct alignas(64) EmissionUpperBound {
 void UpperBoundInBox(const EmissionUpperBound& lanes, const Vec3& center, const Vec3& half,
                      const Falloff& falloff, EmissionUpperBound::Lanes& most);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

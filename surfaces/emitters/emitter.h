@@ -11,7 +11,7 @@
 
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // e(p) = (l / d)^k, with d the distance from p to T (thesis eq. 3.1). Over a flat plate the surface
 // lies further out the finer the mesh is.
@@ -95,4 +95,4 @@ void Fields(Visitor& visit, FlatEmitter& o) {
         o.depth);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,7 +7,7 @@
 
 #include "surfaces/base/simd.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Calls visit(x, mass) for four points with the same moments, up to the second, as the triangle
@@ -230,4 +230,4 @@ SEMBLANCE_WIDE double SumMultipoles(std::span<const MultipoleLanes> lanes,
   return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

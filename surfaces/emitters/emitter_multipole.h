@@ -10,7 +10,7 @@
 
 #include "surfaces/emitters/emitter_triangle.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The sum of the emitters at p is
 //   K = sum of gain * integral of max(n.(p - x), 0) / |p - x|^power dm(x),
@@ -59,4 +59,4 @@ struct alignas(64) MultipoleLanes {
 double SumMultipoles(std::span<const MultipoleLanes> lanes, std::span<const std::int32_t> which,
                      const Vec3& p, int power);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

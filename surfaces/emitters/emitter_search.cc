@@ -8,7 +8,7 @@
 #include <numeric>
 #include <utility>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr int kLanes = EmissionUpperBound::kLanes, kLeaf = 4;
@@ -377,4 +377,4 @@ NeighbourList EmitterSearch::Choose(const std::vector<Candidate>& candidates, Pr
   return near;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

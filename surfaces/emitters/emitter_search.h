@@ -19,7 +19,7 @@
 #include "surfaces/emitters/emitter_multipole.h"
 #include "surfaces/emitters/emitter_triangle.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct NeighbourList {
   // Runs of 4 or 8 emitters in the tree's order, given by (index of first emitter) / (run length).
@@ -163,4 +163,4 @@ class NeighbourListCache {
   mutable std::vector<Set> sets_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -11,7 +11,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // A triangle with the depths of its corners.
@@ -143,4 +143,4 @@ std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const 
   return emitters;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -13,7 +13,7 @@
 #include "surfaces/emitters/emitter.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 inline constexpr double kMaxEmission = 1e12;  // cap on one triangle's emission
 inline constexpr double kRounding = 1e-9;     // relative widening of bounds against round-off
@@ -78,4 +78,4 @@ bool ProjectsOnto(const EmitterTriangle& t, const Vec3& p);
 std::vector<EmitterTriangle> MakeEmitters(const TriMesh& skull, std::span<const double> depth_mm,
                                           EmitterDepth over_triangle);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

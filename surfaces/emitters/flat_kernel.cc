@@ -13,7 +13,7 @@
 #include "surfaces/base/simd.h"
 #include "surfaces/emitters/polygon_integral.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr double kTiny = 1e-300;       // mm^2; avoids 1 / 0
@@ -373,4 +373,4 @@ double FlatKernel::Mean(const EmitterTriangle& t, const Vec3& p, const Vec3& a, 
          4;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 #include "surfaces/emitters/emitter.h"
 #include "surfaces/emitters/emitter_triangle.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Eight triangles, one per lane, so that one instruction processes several. A lane that was not set
 // emits nothing.
@@ -119,4 +119,4 @@ class FlatKernel {
   FlatQuadrature quadrature_;  // used if there is a closed form
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

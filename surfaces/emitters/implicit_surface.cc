@@ -15,7 +15,7 @@
 #include "surfaces/emitters/emitter_triangle.h"
 #include "surfaces/emitters/flat_kernel.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using Kernel = std::variant<FlatKernel, DistanceKernel>;
@@ -113,7 +113,7 @@ struct ImplicitSurface::Impl {
   }
   void GatherReaches(NeighbourList& list) const {
     if (!reach_balls.empty()) {
-      list.reaches = semblance::Gather(reach_balls, list.runs);
+      list.reaches = surfaces::Gather(reach_balls, list.runs);
     }
   }
 
@@ -315,4 +315,4 @@ double ImplicitSurface::EmittersPerSquareDepth() const {
   return squares / area;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

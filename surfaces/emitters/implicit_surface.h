@@ -10,7 +10,7 @@
 #include "surfaces/emitters/emitter.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct NeighbourList;  // emitter_search.h
 
@@ -93,4 +93,4 @@ class ImplicitSurface {
   std::unique_ptr<Impl> impl_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

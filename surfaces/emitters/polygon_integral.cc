@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // With R^2 = height^2 + rho^2 the integrand is the divergence of the radial field g(rho) with n rho
@@ -87,4 +87,4 @@ double IntegrateInversePower(std::span<const EdgeFromFoot> edges, double height,
   return flux * scale / n;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

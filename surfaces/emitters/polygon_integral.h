@@ -4,7 +4,9 @@
 
 #include <span>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // An edge of a polygon relative to the foot of a point on the polygon's plane, in mm. The edge's
 // line lies at `distance` from the foot along the edge's outward normal (negative if the foot lies
@@ -23,4 +25,4 @@ double IntegrateInversePower(std::span<const EdgeFromFoot> edges, double height,
 // The integral over one edge of |p - q|^-n dq; n >= 2; mm^(1-n).
 double IntegrateAlong(const EdgeFromFoot& edge, double height, int n);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

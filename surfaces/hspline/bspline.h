@@ -8,7 +8,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The weights of the four control values that act on a span of unit length, at t in [0,1]:
 // (1-t)^3/6, (4 - 6 t^2 + 3 t^3)/6, (1 + 3 t + 3 t^2 - 3 t^3)/6, t^3/6. `order` 1 or 2 gives their
@@ -85,4 +85,4 @@ struct Stencil {
   }
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -8,7 +8,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 bool Holds(double lowest, double highest, double x) {
@@ -156,4 +156,4 @@ Feature MirrorFeature(const Feature& feature) {
   return mirrored;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

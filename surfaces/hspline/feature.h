@@ -10,7 +10,7 @@
 
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct Feature {
   std::string name;                  // letters, digits, '-', '_'; also the file's name in a library
@@ -65,4 +65,4 @@ FeatureBlend BlendFeatures(std::string name, std::span<const Feature> features,
 // coarser levels are symmetric about x = 0.
 Feature MirrorFeature(const Feature& feature);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

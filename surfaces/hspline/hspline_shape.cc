@@ -9,7 +9,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/bspline.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // The index of the patch along one direction, and the coordinate within it, 0..1.
@@ -112,4 +112,4 @@ std::array<Vec3, 16> RefinePatch(const std::array<Vec3, 16>& vertices, int right
   return fine;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -9,7 +9,7 @@
 
 #include "surfaces/hspline/bspline.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The directions in which the surface is closed: none, or u (a tube).
 enum class Closure { kOpen, kPeriodicU };
@@ -122,4 +122,4 @@ ControlNet Refine(const HSplineShape& shape, const ControlNet& net, int level);
 // Refine.
 std::array<Vec3, 16> RefinePatch(const std::array<Vec3, 16>& vertices, int right, int upper);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

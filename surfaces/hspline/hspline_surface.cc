@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/sparse_net.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 void CheckNet(const HSplineShape& shape, int level, const ControlNet& net) {
@@ -282,4 +282,4 @@ std::optional<SurfaceCurvature> CurvatureAt(const HSplineSurface& surface, const
   return curvature;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -18,7 +18,7 @@
 #include "surfaces/hspline/hspline_shape.h"
 #include "surfaces/hspline/sparse_net.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct SurfaceFrame {
   Vec3 point = Vec3::Constant(kNaN);
@@ -49,9 +49,9 @@ class HSplineSurface {
   const HSplineShape& shape() const { return shape_; }
   int Columns(int level) const { return shape_.Columns(level); }
   int Rows(int level) const { return shape_.Rows(level); }
-  Vec2 GrevillePoint(const VertexId& vertex) const { return semblance::GrevillePoint(shape_, vertex); }
+  Vec2 GrevillePoint(const VertexId& vertex) const { return surfaces::GrevillePoint(shape_, vertex); }
   Stencil StencilAt(int level, const Vec2& uv, DerivativeOrder order = {}) const {
-    return semblance::StencilAt(shape_, level, uv, order);
+    return surfaces::StencilAt(shape_, level, uv, order);
   }
 
   // The finest surface, with the detail of all levels. Evaluates the finest patch at uv that an
@@ -132,4 +132,4 @@ struct SurfaceCurvature {
 // Empty if the frame is not regular. Throws InputError for a (u,v) that is not finite.
 std::optional<SurfaceCurvature> CurvatureAt(const HSplineSurface& surface, const Vec2& uv);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

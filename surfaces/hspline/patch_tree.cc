@@ -6,7 +6,7 @@
 #include <iterator>
 #include <set>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // (level, j, i), which orders patches row by row.
@@ -146,4 +146,4 @@ ControlNet RegionNet(const HSplineSurface& surface, const PatchRegion& region) {
   return net;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

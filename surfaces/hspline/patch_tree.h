@@ -8,7 +8,7 @@
 
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The quadtree of a surface; later changes of the surface do not change it. A leaf is a patch that
 // no offset of a finer level influences, so that the surface is one bicubic polynomial on it. The
@@ -61,4 +61,4 @@ std::vector<PatchRegion> FewRegions(const HSplineShape& shape, const PatchTree& 
 // The (columns + 3) x (rows + 3) control vertices of the region.
 ControlNet RegionNet(const HSplineSurface& surface, const PatchRegion& region);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -8,7 +8,7 @@
 
 #include "surfaces/hspline/bspline.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Result column i is the union of the columns sources(i) of `from`.
@@ -210,4 +210,4 @@ std::vector<LevelLayout> MakeLayouts(const HSplineShape& shape,
   return layout;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

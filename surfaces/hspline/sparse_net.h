@@ -11,7 +11,7 @@
 
 #include "surfaces/hspline/hspline_shape.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Rows [begin, end) of a column.
 struct RowSpan {
@@ -128,4 +128,4 @@ ColumnSpans ParentPatches(const ColumnSpans& patches);
 // The stored vertices of the given patches of a level.
 ColumnSpans VertexSpans(const HSplineShape& shape, int level, const ColumnSpans& patches);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

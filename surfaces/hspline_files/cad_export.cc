@@ -28,7 +28,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/patch_tree.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Suppresses OpenCASCADE's messages, because a library does not print.
@@ -151,4 +151,4 @@ std::string SurfaceToIges(const HSplineSurface& surface) {
   return stream.str();
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

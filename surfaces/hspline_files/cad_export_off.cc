@@ -4,7 +4,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/face_export.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 std::string Refuse(const char* format) {
@@ -22,4 +22,4 @@ std::string SurfaceToStep(const HSplineSurface&) { return Refuse("STEP"); }
 
 std::string SurfaceToIges(const HSplineSurface&) { return Refuse("IGES"); }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

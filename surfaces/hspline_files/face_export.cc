@@ -18,7 +18,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/vtk_xml.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr int kLagrangeQuadrilateral = 70;  // VTK's cell type
@@ -177,4 +177,4 @@ std::string TessellationToGlb(const Tessellation& tessellation) {
   return EncodeGlb({&face, 1});
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,7 +7,7 @@
 
 #include "surfaces/hspline_query/tessellate.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Encodes a surface in the format of a file ending (lower or upper case).
 //   Exact, in mm: .vtu (bicubic patches); .step .stp and .iges .igs (B-spline surfaces).
@@ -41,4 +41,4 @@ bool HasCad();
 std::string SurfaceToStep(const HSplineSurface& surface);  // ISO 10303-214
 std::string SurfaceToIges(const HSplineSurface& surface);  // IGES 5.3, entities 128 and 144
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using namespace json_parts;
@@ -230,4 +230,4 @@ std::map<std::string, Feature> ReadFeatureLibrary(const std::filesystem::path& f
   return library;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

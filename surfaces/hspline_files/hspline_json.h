@@ -10,7 +10,7 @@
 #include "surfaces/hspline/feature.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Throws InputError if a vertex is not finite, which JSON cannot express.
 void CheckFinite(const HSplineSurface& surface);
@@ -53,4 +53,4 @@ std::filesystem::path StoreFeature(const std::filesystem::path& folder, const Fe
 // missing, a file cannot be read, or a file is not named after its feature.
 std::map<std::string, Feature> ReadFeatureLibrary(const std::filesystem::path& folder);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/simd.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using Polynomial = HSplineBatch::Polynomial;
@@ -206,4 +206,4 @@ SurfaceSamples HSplineBatch::PointsAndNormals(std::span<const Vec2> uv, int thre
   return samples;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

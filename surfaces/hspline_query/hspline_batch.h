@@ -8,7 +8,7 @@
 
 #include "surfaces/hspline/patch_tree.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct SurfaceSamples {
   std::vector<Vec3> points;     // mm
@@ -48,4 +48,4 @@ class HSplineBatch {
   std::vector<Polynomial> polynomials_;  // one per leaf
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

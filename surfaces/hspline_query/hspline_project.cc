@@ -12,7 +12,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/patch_tree.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using Mat2 = Eigen::Matrix2d;
@@ -243,4 +243,4 @@ SurfaceProjection SurfaceProjector::Project(const Vec3& point) const {
   return best;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -6,7 +6,7 @@
 
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct ProjectOptions {
   int samples_per_patch = 3;   // >= 1; start samples along a patch side; more find narrower valleys
@@ -51,4 +51,4 @@ class SurfaceProjector {
   std::vector<Vec3> fine_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -20,7 +20,7 @@
 #include "surfaces/hspline/patch_tree.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 Tessellation Tessellate(const HSplineSurface& surface, int per_patch) {
   if (per_patch < 1) {
@@ -288,4 +288,4 @@ Tessellation TessellateToChord(const HSplineSurface& surface, double chord_mm, i
   return TessellateCells(surface, CellsWithinChord(surface, chord_mm), threads);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 #include "surfaces/hspline/hspline_surface.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct Tessellation {
   TriMesh mesh;               // counter-clockwise, seen from the side of du x dv
@@ -59,4 +59,4 @@ std::set<DomainCell> CellsWithinChord(const HSplineSurface& surface, double chor
 // seams.
 void BalanceCells(const HSplineShape& shape, std::set<DomainCell>& cells);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -14,7 +14,7 @@
 
 #include "surfaces/marching/edge_intersections.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr double kSumRounding = 1e-9;  // relative round-off between two orders of a sum
@@ -452,4 +452,4 @@ PolygonizeResult MarchOctree(const MinMaxOctree& octree, const ImplicitSurface& 
   return March(MinMaxRule(octree, surface), octree.sums, cached, surface, grid, options, context);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

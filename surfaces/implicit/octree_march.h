@@ -10,7 +10,7 @@
 
 #include "surfaces/implicit/polygonizer.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Caches each emitter's value at the corners of the octree's nodes during the march through the
 // layers (thesis 3.2.3, fig. 3.4). The depth d of layer k is the smallest depth of a node with a
@@ -54,4 +54,4 @@ PolygonizeResult MarchOctree(const MinMaxOctree& octree, const ImplicitSurface& 
                              const SampleGrid& grid, const EdgeSearchOptions& options,
                              const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

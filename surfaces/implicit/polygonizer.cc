@@ -7,7 +7,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/implicit/octree_march.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Runs polygonize(field) and counts the emitters that the field evaluates.
@@ -118,4 +118,4 @@ PolygonizeResult PolygonizeSurface(const Polygonizer& polygonizer, const Implici
   return std::visit(Polygonize{surface, grid, starts, options, context}, polygonizer);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 #include "surfaces/emitters/implicit_surface.h"
 #include "surfaces/marching/polygonize.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The components of the surface that are followed: the one through the outermost start cells, or
 // all in the grid, including inner sheets and fragments.
@@ -118,4 +118,4 @@ PolygonizeResult PolygonizeSurface(const Polygonizer& polygonizer, const Implici
                                    const SampleGrid& grid, std::span<const StartCell> starts,
                                    const EdgeSearchOptions& options, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 TriMesh WithDepths(const TriMesh& shell, std::span<const double> depth_mm) {
@@ -210,4 +210,4 @@ TriMesh TrimToSkull(const TriMesh& face, const TriMesh& shell, std::span<const d
   return LargestPart(over);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

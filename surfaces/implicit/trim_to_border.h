@@ -8,7 +8,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Keeps the triangles of a face that lie over the shell's triangles with finite depths (depth_mm:
 // one per vertex). It drops the triangles that are nearest to the border of these shell triangles,
@@ -18,4 +18,4 @@ namespace semblance {
 TriMesh TrimToSkull(const TriMesh& face, const TriMesh& shell, std::span<const double> depth_mm,
                     const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

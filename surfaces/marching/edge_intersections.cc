@@ -6,7 +6,7 @@
 #include <cmath>
 #include <utility>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // An interval of an edge: the field is positive at one end and not at the other.
@@ -149,4 +149,4 @@ PolygonizeResult BuildMesh(const SampleGrid& grid, EdgeIntersections intersectio
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -16,7 +16,7 @@
 #include "surfaces/marching/marching_cubes.h"
 #include "surfaces/marching/polygonize.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct CrossedCell {
   std::int64_t index;          // index of the lowest corner
@@ -165,4 +165,4 @@ class SliceMarchingCubes {
   EdgeIntersections intersections_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using Loop = std::vector<std::uint8_t>;  // edges in order
@@ -142,4 +142,4 @@ const std::array<std::array<EdgeBits, 12>, 256>& MarchingCubesLoops() {
   return kLoops;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -8,7 +8,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 // An edge of a cell.
 struct CellEdge {
@@ -51,4 +53,4 @@ const std::array<std::vector<std::array<std::uint8_t, 3>>, 256>& MarchingCubesCa
 // including the edge itself. Two sheets in one cell have disjoint sets.
 const std::array<std::array<EdgeBits, 12>, 256>& MarchingCubesLoops();
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -18,7 +18,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/marching/edge_intersections.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 void CheckGrid(const SampleGrid& grid) {
   const bool sized =
@@ -357,4 +357,4 @@ PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleG
   return BuildMesh(grid, std::move(intersections));
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -15,7 +15,7 @@
 #include "surfaces/marching/marching_cubes.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 using GridIndex = std::array<int, 3>;
 
@@ -117,4 +117,4 @@ PolygonizeResult PolygonizeThrough(const ScalarField& field, const SampleGrid& g
 PolygonizeResult PolygonizeSamples(std::span<const float> samples, const SampleGrid& grid,
                                    const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 std::vector<char> BorderVertices(const TriMesh& mesh, OpenBorder border) {
@@ -56,4 +56,4 @@ Vec3 Correspondences::NormalAt(const MeshPoint& point) const {
       .normalized();
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

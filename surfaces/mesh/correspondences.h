@@ -9,7 +9,7 @@
 
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct CorrespondenceOptions {
   double reach_mm = std::numeric_limits<double>::infinity();  // largest distance between the two
@@ -56,4 +56,4 @@ class Correspondences {
   MeshQuery query_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 double LengthAlong(const CutPlane& plane, const TriMesh& mesh,
@@ -89,4 +89,4 @@ TriMesh WithinScan(const TriMesh& face, std::span<const CutPlane> planes, double
   return Submesh(face, keep);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

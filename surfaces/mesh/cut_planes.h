@@ -8,7 +8,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The plane p[axis] = at_mm; the skull lies on the side where sign * (p[axis] - at_mm) < 0.
 struct CutPlane {
@@ -35,4 +35,4 @@ std::string InWords(const CutPlane& plane);
 // at least margin_mm from each.
 TriMesh WithinScan(const TriMesh& face, std::span<const CutPlane> planes, double margin_mm);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

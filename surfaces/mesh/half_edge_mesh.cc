@@ -7,7 +7,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // OpenMesh reports each face that it refuses to std::cerr, but a library must not print. The
@@ -83,4 +83,4 @@ HalfEdgeMesh MakeManifold(const TriMesh& mesh, const char* caller) {
   return std::move(half_edges.mesh);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -13,7 +13,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct HalfEdgeTraits : OpenMesh::DefaultTraits {
   using Point = Vec3;
@@ -44,4 +44,4 @@ bool IsPinched(const HalfEdgeMesh& mesh, OpenMesh::VertexHandle vertex);
 // other mesh, with the name of the caller and a triangle at fault.
 HalfEdgeMesh MakeManifold(const TriMesh& mesh, const char* caller);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // The unit in which the size is nearest to that of a head, with the remedy; otherwise the advice to
@@ -111,4 +111,4 @@ std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& n
   return notes;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

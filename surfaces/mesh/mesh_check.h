@@ -7,7 +7,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The range of the longest side of a head, or of the scanned part of one.
 inline constexpr double kSmallestHead_mm = 60, kLargestHead_mm = 500;
@@ -24,4 +24,4 @@ void CheckHeadSize(double longest_mm, const std::string& name, const std::string
 // defect of real scans: open, non-manifold or inconsistent edges.
 std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& name);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

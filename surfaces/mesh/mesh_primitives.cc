@@ -8,7 +8,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 Vec3 OnCircle(const Vec3& u, const Vec3& v, int i, int count) {
@@ -85,4 +85,4 @@ void Append(TriMesh& mesh, const TriMesh& part) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

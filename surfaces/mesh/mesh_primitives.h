@@ -4,7 +4,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // A closed cylinder with outward triangles. Throws InputError unless sides >= 3, radius_mm > 0 and
 // from != to.
@@ -17,4 +17,4 @@ TriMesh MakeSphere(const Vec3& center, double radius_mm, int rings = 12);
 // Adds the points and triangles of `part` to the mesh.
 void Append(TriMesh& mesh, const TriMesh& part);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

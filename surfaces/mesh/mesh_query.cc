@@ -20,7 +20,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Round-off: where the squared sine of the angle at a is smaller, the triangle counts as its edges.
@@ -267,4 +267,4 @@ double PointQuery::DistanceTo(const Vec3& p, int rank) const {
   return std::sqrt(farthest);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct TrianglePoint {
   Vec3 position = Vec3::Constant(kNaN);  // on the triangle, mm
@@ -81,4 +81,4 @@ class PointQuery {
   std::unique_ptr<Tree> tree_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

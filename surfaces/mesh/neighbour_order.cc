@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // The triangles at each vertex v: those of `around` from first[v] to first[v + 1].
@@ -95,4 +95,4 @@ void PutBackInOrder(const OrderedMesh& ordered, const std::vector<std::int32_t>&
                          [](const auto& placed) { return placed.second; });
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,7 +7,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // True if neighbours are so far apart in memory that work along the surface would wait for it. In a
 // surface that is stored row by row, neighbours are at most a row apart.
@@ -29,4 +29,4 @@ OrderedMesh InOrderOfNeighbours(const TriMesh& mesh);
 void PutBackInOrder(const OrderedMesh& ordered, const std::vector<std::int32_t>& triangles,
                     TriMesh& part);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -14,7 +14,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using RemeshKernel = CGAL::Simple_cartesian<double>;
@@ -122,4 +122,4 @@ TriMesh Remesh(const TriMesh& mesh, double edge_mm) {
   return FromCgal(half_edges);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

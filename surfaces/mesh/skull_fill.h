@@ -10,7 +10,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct WrapFill {
   static constexpr std::string_view kName = "wrap";
@@ -68,4 +68,4 @@ TriMesh FillSkull(const TriMesh& skull, const SkullFill& fill, const RunContext&
 // oriented manifold.
 TriMesh Remesh(const TriMesh& mesh, double edge_mm);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

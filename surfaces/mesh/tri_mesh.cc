@@ -12,7 +12,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/half_edge_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 int Root(std::vector<int>& parent, int i) {
@@ -271,4 +271,4 @@ TriMesh Transformed(const TriMesh& mesh, const Similarity& to_from) {
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

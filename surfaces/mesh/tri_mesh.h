@@ -10,7 +10,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 using Triangle =
     std::array<std::int32_t, 3>;  // indices into points, counter-clockwise seen from outside
@@ -82,4 +82,4 @@ TriMesh ClusterVertices(const TriMesh& mesh, double cell_mm);
 
 TriMesh Transformed(const TriMesh& mesh, const Similarity& to_from);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

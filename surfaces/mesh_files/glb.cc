@@ -14,7 +14,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/srgb.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -244,4 +244,4 @@ bool IsGlbPicture(std::string_view bytes) {
 
 std::string EncodeGlb(std::span<const GlbNode> nodes) { return GlbWriter().Write(nodes); }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -11,7 +11,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct GlbMaterial {
   std::string name;
@@ -46,4 +46,4 @@ bool IsGlbPicture(std::string_view bytes);
 // points, or with a texture that is neither PNG nor JPEG.
 std::string EncodeGlb(std::span<const GlbNode> nodes);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

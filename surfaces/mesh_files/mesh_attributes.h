@@ -9,7 +9,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 struct VertexScalar {
   // In a PLY, MeshLab shows the scalar "quality", and CloudCompare every "scalar_...".
@@ -27,4 +27,4 @@ struct MeshAttributes {
 // Throws InputError if an attribute has neither zero entries nor one per vertex.
 void CheckAttributes(std::size_t vertices, const MeshAttributes& attributes);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

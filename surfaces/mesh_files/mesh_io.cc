@@ -18,7 +18,7 @@
 #include "surfaces/mesh_files/read_stl.h"
 #include "surfaces/mesh_files/text_lines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 std::string LowerExtension(const std::filesystem::path& path) {
@@ -200,4 +200,4 @@ std::string EncodeMesh(const TriMesh& mesh, const std::string& extension,
                                : EncodeStl(mesh);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -9,7 +9,7 @@
 #include "surfaces/mesh/tri_mesh.h"
 #include "surfaces/mesh_files/mesh_attributes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Reads a mesh; the format follows the extension (.ply .obj .stl .off). All faces are kept as they
 // are, also where edges are non-manifold. Polygons become triangles, and equal corners of an STL
@@ -31,4 +31,4 @@ std::string EncodeMesh(const TriMesh& mesh, const std::string& extension,
                        const MeshAttributes& attributes = {},
                        double chord_mm = std::numeric_limits<double>::infinity());
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

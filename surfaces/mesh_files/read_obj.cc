@@ -16,7 +16,7 @@
 
 #include "surfaces/mesh_files/text_lines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Keywords that do not describe the shape.
@@ -220,4 +220,4 @@ ObjFile ReadObjFile(std::string_view bytes, const std::string& name) {
   return ObjReader(bytes, name, ObjReader::Keep::kLooks).Read();
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

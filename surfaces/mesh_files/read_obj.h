@@ -9,7 +9,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Reads the vertices (TextLines::NextPoint) and polygons of an OBJ; polygons become triangles.
 // Indices may be relative (-1 is the last vertex so far). A corner that repeats an earlier one of
@@ -42,4 +42,4 @@ struct ObjFile {
 // Throws InputError as ReadObj does, and for a texture coordinate that is not finite or missing.
 ObjFile ReadObjFile(std::string_view bytes, const std::string& name);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -9,7 +9,7 @@
 
 #include "surfaces/mesh_files/text_lines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 class OffReader {
@@ -141,4 +141,4 @@ TriMesh ReadOff(std::string_view bytes, const std::string& name) {
   return OffReader(bytes, name).Read();
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

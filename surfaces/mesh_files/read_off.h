@@ -7,7 +7,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Reads the vertices (TextLines::NextPoint) and polygons of a text OFF; polygons become triangles.
 // Each vertex and each face is a line; comments begin with '#'. The header may be OFF with ST
@@ -17,4 +17,4 @@ namespace semblance {
 // coordinate that is not finite.
 TriMesh ReadOff(std::string_view bytes, const std::string& name);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

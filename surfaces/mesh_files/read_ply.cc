@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/text_lines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // In bytes.
@@ -623,4 +623,4 @@ MeshAttributes ReadPlyAttributes(std::string_view bytes, const std::string& name
              : ReadAttributesData(PlyBinaryData(bytes, header, name), header, vertex);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

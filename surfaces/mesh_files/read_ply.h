@@ -11,7 +11,7 @@
 #include "surfaces/mesh/tri_mesh.h"
 #include "surfaces/mesh_files/mesh_attributes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Reads the positions x, y, z of element 'vertex' and the polygons vertex_indices (or vertex_index)
 // of element 'face', which become triangles. Coordinates of type double and of whole types keep all
@@ -59,4 +59,4 @@ struct PlyHeader {
 // with the line for anything else. name: the file, for messages.
 PlyHeader ReadPlyHeader(std::string_view bytes, const std::string& name);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

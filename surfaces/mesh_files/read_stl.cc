@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/text_lines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr std::size_t kHeader = 84, kRecord = 50;  // bytes: 80 of words and a count; one triangle
@@ -193,4 +193,4 @@ TriMesh ReadStl(std::string_view bytes, const std::string& name) {
   return IsText(bytes) ? TextReader(bytes, name).Read() : ReadBinary(bytes, name);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,7 +7,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Reads the triangles of an STL. Corners that are equal in single precision become one point;
 // points are in the order of their first use. A triangle with two equal corners is dropped, as
@@ -17,4 +17,4 @@ namespace semblance {
 // finite.
 TriMesh ReadStl(std::string_view bytes, const std::string& name);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

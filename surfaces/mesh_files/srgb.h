@@ -8,7 +8,9 @@
 #include <cstdint>
 #include <vector>
 
-namespace semblance {
+#include "surfaces/base/layers.h"
+
+namespace semblance::surfaces {
 
 inline double LinearFromSrgb(double v) {
   return v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4);
@@ -33,4 +35,4 @@ inline std::uint8_t SrgbByte(float linear) {
   return kTable[static_cast<int>(std::clamp(linear, 0.0F, 1.0F) * (kEntries - 1) + 0.5F)];
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

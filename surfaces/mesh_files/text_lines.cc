@@ -12,7 +12,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 bool IsBlank(char c) { return c == ' ' || (c >= '\t' && c <= '\r'); }
@@ -186,4 +186,4 @@ void TextLines::FailAt(std::int64_t line, const std::string& what) const {
   throw InputError(fmt::format("{}: line {}: {}", name_, line, what));
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

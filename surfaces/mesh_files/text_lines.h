@@ -11,7 +11,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // The largest number of vertices, faces or other elements in a file: an index of a triangle can
 // name no more.
@@ -86,4 +86,4 @@ class TextLines {
   std::int64_t number_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

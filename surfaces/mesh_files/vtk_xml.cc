@@ -13,7 +13,7 @@
 
 #include "surfaces/base/encoding.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr std::uint8_t kTriangle = 5;  // the number of the cell type in VTK
@@ -173,4 +173,4 @@ std::string EncodeVtu(const TriMesh& mesh, const MeshAttributes& attributes) {
                  "<Cells>\n" + ConnectivityXml(mesh) + types + "</Cells>\n", mesh, attributes);
 }
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

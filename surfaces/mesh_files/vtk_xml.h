@@ -8,7 +8,7 @@
 #include "surfaces/mesh/tri_mesh.h"
 #include "surfaces/mesh_files/mesh_attributes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 
 // Writes .vtp (vtkPolyData) and .vtu (vtkUnstructuredGrid, which meshio reads too). Coordinates and
 // values are doubles in Base64, so that no digit is lost, and NaN if there is no data. Normals
@@ -20,4 +20,4 @@ namespace semblance {
 std::string EncodeVtp(const TriMesh& mesh, const MeshAttributes& attributes);
 std::string EncodeVtu(const TriMesh& mesh, const MeshAttributes& attributes);
 
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -19,7 +19,7 @@
 #include "tests/bench/entry.h"
 #include "tests/bench/real_head.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kTarget = 14000;
@@ -232,6 +232,6 @@ void RunAll() {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
 
-int main() { semblance::RunAll(); }
+int main() { semblance::problems::RunAll(); }

@@ -12,6 +12,7 @@
 #include "surfaces/emitters/implicit_surface.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 // Sums all emitters that emit more than 1 / m: with `cut_below` = 1 / m it is the same field.
 class EmitterGrid {

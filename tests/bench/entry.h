@@ -10,6 +10,7 @@
 #include <string>
 
 namespace semblance::bench {
+using namespace problems;
 
 struct Entry {
   std::string name;

@@ -17,6 +17,7 @@
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::bench {
+using namespace problems;
 namespace {
 
 namespace fs = std::filesystem;

@@ -6,6 +6,7 @@
 #include "tests/testing/adaptive_coverage.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 // How far the share is from the 90 % that it should be; with a tolerance of several times the noise
 // it is known to be less.

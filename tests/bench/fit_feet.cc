@@ -17,6 +17,7 @@
 #include "tests/testing/point_sets.h"
 
 namespace semblance::bench {
+using namespace problems;
 namespace {
 
 using testing::PointSet;

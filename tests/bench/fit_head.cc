@@ -6,6 +6,7 @@
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 Measured MeasureHead(int count, double tolerance, Solver solver) {
   const HSplineShape shape{

@@ -25,6 +25,7 @@
 #include "tests/testing/terrain.h"
 
 namespace semblance::bench {
+using namespace problems;
 namespace {
 
 using Height = std::function<double(const Vec2&)>;

@@ -14,6 +14,7 @@
 #include "tests/bench/fit_parts.h"
 
 namespace semblance::bench {
+using namespace problems;
 namespace {
 
 constexpr int kPatches = 128;  // 131 x 131 control vertices

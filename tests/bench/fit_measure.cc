@@ -12,6 +12,7 @@
 #include <cstdio>
 
 namespace semblance::bench {
+using namespace problems;
 
 double CpuSecondsSoFar() {
   rusage usage{};

@@ -9,6 +9,7 @@
 #include "surfaces/base/geometry.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 struct Measured {
   double seconds = kNaN;

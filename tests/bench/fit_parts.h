@@ -6,6 +6,7 @@
 #include "tests/bench/fit_measure.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 // The adaptive fit of the head-like surface (scattered_data.h) at 1e4, 1e5 and 1e6 points, against
 // figures of peers that are not in Debian.

@@ -13,6 +13,7 @@
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::bench {
+using namespace problems;
 namespace {
 
 // The head's points, and the clean surface on the grid of ErrorAgainst, as the peers read them.

@@ -10,6 +10,7 @@
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::bench {
+using namespace problems;
 namespace {
 
 // 1e5 points of the head, noise 1e-4, whose (u,v) are off by up to 0.005 along each axis, a third

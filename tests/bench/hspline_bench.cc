@@ -22,7 +22,7 @@
 #include "surfaces/hspline_query/hspline_project.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kCount = 1'000'000;
@@ -220,6 +220,6 @@ int Main() {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
 
-int main() { return semblance::Main(); }
+int main() { return semblance::problems::Main(); }

@@ -21,7 +21,7 @@
 #include "tests/bench/vtk_peer.h"
 #endif
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using bench::CpuSeconds;
@@ -430,16 +430,16 @@ void Kernel() {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
 
 int main(int count, char** arguments) {
   const std::vector<std::pair<std::string, void (*)()>> parts = {
-      {"memory", semblance::Memory},  // before others have needed any
-      {"thesis", semblance::AgainstThesis},   {"par", semblance::AtPar},
-      {"floor", semblance::AgainstFloor},     {"growth", semblance::Growth},
-      {"emitters", semblance::EmitterGrowth}, {"threads", semblance::TwoThreads},
-      {"cgal", semblance::AgainstCgal},       {"skull", semblance::RealSkull},
-      {"vtk", semblance::AgainstVtk},         {"kernel", semblance::Kernel}};
+      {"memory", semblance::problems::Memory},  // before others have needed any
+      {"thesis", semblance::problems::AgainstThesis},   {"par", semblance::problems::AtPar},
+      {"floor", semblance::problems::AgainstFloor},     {"growth", semblance::problems::Growth},
+      {"emitters", semblance::problems::EmitterGrowth}, {"threads", semblance::problems::TwoThreads},
+      {"cgal", semblance::problems::AgainstCgal},       {"skull", semblance::problems::RealSkull},
+      {"vtk", semblance::problems::AgainstVtk},         {"kernel", semblance::problems::Kernel}};
   const std::vector<std::string> asked(arguments + 1, arguments + count);
   for (const auto& [name, run] : parts) {
     if (asked.empty() || std::find(asked.begin(), asked.end(), name) != asked.end()) {

@@ -14,7 +14,7 @@
 #include "tests/bench/entry.h"
 #include "tests/bench/real_head.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using bench::Head;
@@ -160,6 +160,6 @@ void MeasureAll() {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
 
-int main() { semblance::MeasureAll(); }
+int main() { semblance::problems::MeasureAll(); }

@@ -21,7 +21,7 @@
 #include "interp/interpolate_depth.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct Scene {
@@ -304,8 +304,8 @@ void MeasureAll(std::span<char*> names) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
 
 int main(int count, char** arguments) {
-  semblance::MeasureAll({arguments + 1, static_cast<std::size_t>(count - 1)});
+  semblance::problems::MeasureAll({arguments + 1, static_cast<std::size_t>(count - 1)});
 }

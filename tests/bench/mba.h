@@ -10,6 +10,7 @@
 #include <vector>
 
 namespace semblance::bench {
+using namespace problems;
 
 struct HeightPoint {
   double u = 0, v = 0, z = 0;  // u and v in [0,1]

@@ -11,6 +11,7 @@
 #include <string>
 
 namespace semblance::bench {
+using namespace problems;
 
 // Counts from its making on, by the kernel's account of all processors less this program's own
 // processor time.

@@ -8,6 +8,7 @@
 #include <fstream>
 
 namespace semblance::bench {
+using namespace problems;
 namespace {
 
 std::filesystem::path NewFolder() {

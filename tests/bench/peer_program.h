@@ -10,6 +10,7 @@
 #include "tests/bench/fit_measure.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 // Files of doubles in a folder of their own, which goes with this object.
 class PeerFiles {

@@ -9,6 +9,7 @@
 #include "problems/subject/phantom.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 struct Head {
   TriMesh skull;

@@ -18,7 +18,7 @@
 #include "problems/experiment/experiment_config.h"
 #include "problems/run.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::vector<std::string> Split(std::string_view text, char at) {
@@ -78,7 +78,7 @@ void Measure(const std::string& head, const std::string& variant, StageCache& ca
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
 
 int main(int argc, char** argv) {
   using namespace semblance;

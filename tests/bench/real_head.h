@@ -15,6 +15,7 @@
 #include "tests/bench/phantom_head.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 // The filled shell; none, and a line that says what is skipped, without the mesh.
 inline std::optional<TriMesh> RealShell(const std::string& skipped) {

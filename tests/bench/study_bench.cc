@@ -11,7 +11,7 @@
 #include "problems/study/report/study_report.h"
 #include "surfaces/base/atomic_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -60,12 +60,12 @@ void Measure(const fs::path& folder) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
 
 int main() {
   const auto folder = std::filesystem::temp_directory_path() / "semblance_study_bench";
   std::filesystem::remove_all(folder);
   std::filesystem::create_directories(folder);
-  semblance::Measure(folder);
+  semblance::problems::Measure(folder);
   std::filesystem::remove_all(folder);
 }

@@ -10,6 +10,7 @@
 #include <vtkSampleFunction.h>
 
 namespace semblance::bench {
+using namespace problems;
 namespace {
 
 class FieldFunction : public vtkImplicitFunction {

@@ -6,6 +6,7 @@
 #include "surfaces/marching/polygonize.h"
 
 namespace semblance::bench {
+using namespace problems;
 
 // How many triangles the surface of the field's zeros has.
 std::size_t TrianglesByVtk(const ScalarField& field, const SampleGrid& grid);

@@ -7,7 +7,7 @@
 #include <iostream>
 #include <vector>
 
-using namespace semblance;
+using namespace semblance::fitting;
 
 int main() {
   std::vector<Vec3> points;

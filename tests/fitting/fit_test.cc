@@ -16,7 +16,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using ::testing::HasSubstr;
@@ -429,4 +429,4 @@ TEST(Fit, StopsWhenAsked) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

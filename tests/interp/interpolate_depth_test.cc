@@ -14,7 +14,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Count;
@@ -330,4 +330,4 @@ TEST(MeanDepth, IsTheMeanEverywhere) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

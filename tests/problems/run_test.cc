@@ -32,7 +32,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -65,7 +65,7 @@ std::map<std::string, std::string> FilesOfRun(const Experiment& experiment, cons
   RunContext context;
   context.threads = threads;
   OutputFolder output(folder, WhenNotEmpty::kRefuse);
-  WriteRun(experiment, semblance::Run(experiment, context), output, context);
+  WriteRun(experiment, problems::Run(experiment, context), output, context);
   auto files = FilesOf(folder);
   EXPECT_EQ(files.erase("timing.json"), 1u);
   return files;
@@ -74,7 +74,7 @@ std::map<std::string, std::string> FilesOfRun(const Experiment& experiment, cons
 TEST(Run, ThePhantomsImplicitFaceIsWithinAMillimetreOfTheTruth) {
   const Experiment experiment = ReadConfig<Experiment>(
       kConfigs / "phantom.yaml", std::vector<std::string>{"implicit.resolution=90"});
-  const RunResult result = semblance::Run(experiment, {});
+  const RunResult result = problems::Run(experiment, {});
   ASSERT_TRUE(result.truth);
   EXPECT_LE(result.truth->implicit.truth_to_face.rms_mm, 1.0);
   EXPECT_GE(result.truth->implicit.truth_to_face.area_cm2, 250);
@@ -84,9 +84,9 @@ TEST(Run, ThePhantomsImplicitFaceIsWithinAMillimetreOfTheTruth) {
 }
 
 TEST(Run, TheThinPlateNearsTheTipsAndThePlacedTemplateStays) {
-  const RunResult placed = semblance::Run(SmallPhantom({"face=placed"}), {});
+  const RunResult placed = problems::Run(SmallPhantom({"face=placed"}), {});
   const RunResult bent =
-      semblance::Run(SmallPhantom({"face={type: thin_plate, stiffness_mm: 0}"}), {});
+      problems::Run(SmallPhantom({"face={type: thin_plate, stiffness_mm: 0}"}), {});
   EXPECT_EQ(placed.fit.surface.Offsets(), placed.placed.surface.Offsets());
   EXPECT_GT(placed.fit.dowel_rms_mm, 1);
   EXPECT_LT(
@@ -107,7 +107,7 @@ std::string TemplateOfIctFiles() {
 // map.
 TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjects) {
   const std::string files = TemplateOfIctFiles();
-  const RunResult placed = semblance::Run(SmallPhantom({files, "face=placed"}), {});
+  const RunResult placed = problems::Run(SmallPhantom({files, "face=placed"}), {});
   const Similarity& face_from_template = placed.face_from_template;
   const auto widened = [](const Vec3& p) { return Vec3(1.1 * p.x() + 0.2 * p.z(), p.y(), p.z()); };
   std::string csv = "site,x,y,z\n";
@@ -120,7 +120,7 @@ TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjects) {
   WriteFileAtomically(folder.Path() / "skull.csv", csv);
   const std::string face =
       fmt::format("face={{type: reference, landmarks: {}/skull.csv}}", folder.Path().string());
-  const RunResult carried = semblance::Run(SmallPhantom({files, face}), {});
+  const RunResult carried = problems::Run(SmallPhantom({files, face}), {});
   for (const Vec2& uv : {Vec2(0.5, 0.5), Vec2(0.3, 0.7), Vec2(0.8, 0.2)}) {
     EXPECT_LT((widened(carried.fit.surface.Point(uv)) - placed.fit.surface.Point(uv)).norm(), 0.01);
   }
@@ -128,7 +128,7 @@ TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjects) {
 
   WriteFileAtomically(folder.Path() / "skull.csv", csv.substr(0, csv.find("\n", 60) + 1));
   EXPECT_THAT(WordsOf<InputError>([&] {
-                semblance::Run(SmallPhantom({files, face}), {});
+                problems::Run(SmallPhantom({files, face}), {});
               }),
               HasSubstr("landmarks with the subject"));
 }
@@ -150,7 +150,7 @@ Experiment PhantomWithPrior(const std::vector<std::string>& more) {
 
 TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
   const Experiment experiment = PhantomWithPrior({});
-  const RunResult result = semblance::Run(experiment, {});
+  const RunResult result = problems::Run(experiment, {});
   ASSERT_TRUE(result.prior && result.uncertainty);
   EXPECT_TRUE(result.usable());
   EXPECT_EQ(result.prior->coefficients.size(), 20);
@@ -164,13 +164,13 @@ TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
 // At a site that the prior lacks, the (u,v) is that of the point of the face nearest to the tip.
 TEST(Run, APriorsFaceIsMeasuredWhereItMeetsTheDowels) {
   const std::string mine = "sites={mine: {near: [im_l, lo_l], depth: 12}}";
-  const RunResult result = semblance::Run(PhantomWithPrior({mine}), {});
+  const RunResult result = problems::Run(PhantomWithPrior({mine}), {});
   const auto at = std::ranges::find(result.target.points, "mine", &FitPoint::label);
   ASSERT_NE(at, result.target.points.end());
   const double nearest_mm = MeshQuery(result.face.mesh).Closest(at->position).distance_mm;
   EXPECT_NEAR(result.fit.residual_mm[at - result.target.points.begin()], nearest_mm, 0.1);
   EXPECT_THAT(WordsOf<InputError>(
-                  [] { semblance::Run(PhantomWithPrior({"sites={g: {uv: [0.3, 0.3]}}"}), {}); }),
+                  [] { problems::Run(PhantomWithPrior({"sites={g: {uv: [0.3, 0.3]}}"}), {}); }),
               HasSubstr("sites.g.uv: `face: prior` has its own place for the landmark g"));
 }
 
@@ -180,7 +180,7 @@ TEST(Run, EditsChangeTheFacesDrawnBesideAsTheDrawItself) {
   const std::string edits = "edits=" + (folder / "mine.yaml").string();
   StageCache cache(8);
   const auto run = [&](const std::vector<std::string>& more) {
-    return semblance::Run(PhantomWithPrior(more), {}, &cache);
+    return problems::Run(PhantomWithPrior(more), {}, &cache);
   };
   const RunResult plain = run({"uncertainty.samples=1"}),
                   edited = run({"uncertainty.samples=1", edits}),
@@ -193,9 +193,9 @@ TEST(Run, EditsChangeTheFacesDrawnBesideAsTheDrawItself) {
 
 TEST(Run, ASampleIsTheFaceOfTheDrawOfItsNumber) {
   StageCache cache(8);
-  const RunResult likely = semblance::Run(
+  const RunResult likely = problems::Run(
       PhantomWithPrior({"uncertainty.samples=2", "uncertainty.random_seed=3"}), {}, &cache);
-  const RunResult drawn = semblance::Run(PhantomWithPrior({"face.draw=4"}), {}, &cache);
+  const RunResult drawn = problems::Run(PhantomWithPrior({"face.draw=4"}), {}, &cache);
   ASSERT_EQ(likely.uncertainty->samples.size(), 2u);
   EXPECT_EQ(likely.uncertainty->samples[1].Offsets(), drawn.fit.surface.Offsets());
   EXPECT_NE(likely.fit.surface.Offsets(), drawn.fit.surface.Offsets());
@@ -230,7 +230,7 @@ double SharpestEdge_deg(const TriMesh& mesh) {
 }
 
 TEST(Run, TheFaceIsASheetWithoutFoldsThatFacesOut) {
-  const RunResult result = semblance::Run(SmallPhantom({"uncertainty.sigma=false"}), {});
+  const RunResult result = problems::Run(SmallPhantom({"uncertainty.sigma=false"}), {});
   const TriMesh& face = result.face.mesh;
   const EdgeReport edges = CheckEdges(face);
   EXPECT_EQ(edges.non_manifold, 0);
@@ -249,7 +249,7 @@ TEST(Run, TheFaceIsASheetWithoutFoldsThatFacesOut) {
 
 // Level 0 alone, with one more term.
 RunResult RunWithTerm(const std::string& term, StageCache& cache) {
-  return semblance::Run(
+  return problems::Run(
       SmallPhantom({fmt::format("fit.terms=[points, smoothness, membrane{}]", term),
                     "fit.plan.schedule=[{level: 0, fraction: 1}]", "fit.relaxation=none",
                     "uncertainty.sigma=false"}),
@@ -318,7 +318,7 @@ int KeptFeatures(const RunResult& result) {
 TEST(Run, SaysWhatItDidToTheFeatures) {
   StageCache cache(16);
   for (const std::string rule : {"frozen", "free"}) {
-    const RunResult result = semblance::Run(
+    const RunResult result = problems::Run(
         SmallPhantom({fmt::format("fit.features={}", rule), "uncertainty.sigma=false"}), {},
         &cache);
     const int features = static_cast<int>(FeatureVertices(result.placed).size());
@@ -344,8 +344,8 @@ TEST(Run, ATemplateFromAFileGivesTheSameFaceToTheBit) {
       {fmt::format("template={{type: file, surface: {}, sites: {}, features: {}}}",
                    files.surface.string(), files.sites.string(), files.features.string())});
   StageCache cache(16);
-  const RunResult first = semblance::Run(formula, {}, &cache),
-                  second = semblance::Run(from_file, {}, &cache);
+  const RunResult first = problems::Run(formula, {}, &cache),
+                  second = problems::Run(from_file, {}, &cache);
   EXPECT_EQ(ResultJson(formula, first).dump(), ResultJson(from_file, second).dump());
   EXPECT_EQ(HSplineToJson(first.fit.surface), HSplineToJson(second.fit.surface));
   EXPECT_EQ(first.face.mesh.points, second.face.mesh.points);
@@ -359,7 +359,7 @@ TEST(Run, ATemplateThatIsNotThereIsOneClearError) {
               HasSubstr("template.surface: no file is named"));
   Experiment experiment = SmallPhantom({});
   experiment.face_template = FileTemplate{"/no/head.hspline.json", "/no/sites.csv", {}};
-  EXPECT_THROW(semblance::Run(experiment, {}), IoError);
+  EXPECT_THROW(problems::Run(experiment, {}), IoError);
 }
 
 // A phantom in files. Only its left cheek is missing.
@@ -476,7 +476,7 @@ TEST(Run, ASkullWithoutLandmarksIsOneClearError) {
       << "subject: {type: files, skull: a.ply}\n"
       << "network: " << (kConfigs / "networks/standard32.yaml") << "\n";
   EXPECT_EQ(WordsOf<InputError>(
-                [&] { semblance::Run(ReadConfig<Experiment>(folder / "e.yaml", {}), {}); }),
+                [&] { problems::Run(ReadConfig<Experiment>(folder / "e.yaml", {}), {}); }),
             "subject.landmarks: no file is named; a skull needs landmarks (configs/landmarks/ "
             "shows the form)");
 }
@@ -486,7 +486,7 @@ TEST(Run, ARegionWithoutSkinIsToldBeforeTheFit) {
   RunContext context;
   context.on_event = [&steps](const Event& event) { steps.push_back(event.step); };
   const Experiment all_excluded = SmallPhantom({"region.exclude=[{site: n, radius_mm: 200}]"});
-  EXPECT_THAT(WordsOf<InputError>([&] { semblance::Run(all_excluded, context); }),
+  EXPECT_THAT(WordsOf<InputError>([&] { problems::Run(all_excluded, context); }),
               HasSubstr("no vertex of the true skin is scored"));
   EXPECT_THAT(steps, ::testing::Contains("polygonize"));
   EXPECT_THAT(steps, ::testing::Not(::testing::Contains("fit")));
@@ -497,8 +497,8 @@ TEST(Run, CanBeStopped) {
   source.request_stop();
   RunContext context;
   context.stop_token = source.get_token();
-  EXPECT_THROW(semblance::Run(SmallPhantom(), context), Cancelled);
+  EXPECT_THROW(problems::Run(SmallPhantom(), context), Cancelled);
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

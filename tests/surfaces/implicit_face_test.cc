@@ -8,7 +8,7 @@
 #include "surfaces/mesh/skull_fill.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::Joined;
@@ -178,4 +178,4 @@ TEST(SkullFill, BridgesAHoleAndLeavesTheRestOnBone) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,6 +10,7 @@
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 // Fits a field with a bump to 1,100 points with noise in z (sixteen per finest patch). Returns the
 // share of grid points at which the fitted surface lies within the 90 % interval of the true one,

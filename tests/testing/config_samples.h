@@ -15,6 +15,7 @@
 #include "surfaces/base/fields.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 enum class Sex { kMale, kFemale };
 constexpr auto EnumNames(Sex) { return std::to_array<std::string_view>({"male", "female"}); }

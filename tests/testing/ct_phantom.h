@@ -9,6 +9,7 @@
 #include "problems/io/volumes/ct_volume.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 struct CtPhantom {
   Vec3 centre{60, -60, 30};  // the head is cut below z = 0

@@ -14,6 +14,7 @@
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 struct DowelScene {
   TriMesh skull;

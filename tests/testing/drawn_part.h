@@ -11,6 +11,7 @@
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 inline constexpr double kDrawnDepth = 0.15;
 

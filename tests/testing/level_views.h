@@ -12,6 +12,7 @@
 #include "tests/testing/splines.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 // A wavy sheet of 80 x 60 mm with random vertices of +- roughness.
 inline ControlNet Sheet(int m, int n, double roughness_mm, std::uint64_t random_seed) {

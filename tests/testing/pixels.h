@@ -8,6 +8,7 @@
 #include "problems/report/pictures/image.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 // The pixel at column x and row y, which must be inside.
 inline Colour PixelAt(const Image& image, int x, int y) {

@@ -15,6 +15,7 @@
 #include "tests/testing/scattered_data.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 struct PointSet {
   std::string name;

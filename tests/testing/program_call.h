@@ -12,6 +12,7 @@
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 struct Outcome {
   int code = -1;

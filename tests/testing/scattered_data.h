@@ -17,6 +17,7 @@
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 inline double Franke(double x, double y) {
   const auto square = [](double t) { return t * t; };

@@ -12,6 +12,7 @@
 #include "surfaces/base/error.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 // Writes `text` to a file named after the running test.
 inline std::filesystem::path ScratchFile(std::string_view text) {

@@ -10,6 +10,7 @@
 #include <string>
 
 namespace semblance::testing {
+using namespace problems;
 
 class ScratchFolder {
  public:

@@ -14,6 +14,7 @@
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 // The unit-square plate [0,size] x [0,size] at z = 0, normals up, in n x n squares of two triangles
 // each.
@@ -129,7 +130,7 @@ inline TriMesh Shuffled(const TriMesh& mesh) {
 
 }  // namespace semblance::testing
 
-namespace semblance {
+namespace semblance::problems {
 
 // The enclosed volume, mm^3; > 0 if the mesh is closed and outward. For an open mesh it depends on
 // the origin.
@@ -141,4 +142,4 @@ inline double SignedVolume(const TriMesh& mesh) {
   return six_volumes / 6;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

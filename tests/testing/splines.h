@@ -10,6 +10,7 @@
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 // A bent sheet (open), or a tube (closed in u).
 inline Vec3 SmoothPlace(const HSplineShape& shape, double u, double v) {

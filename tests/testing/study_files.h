@@ -11,6 +11,7 @@
 #include "surfaces/base/atomic_file.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 // The files of a study's folder by name, after its tables were rewritten, without the parts that
 // differ from run to run: the trials' timing.json and the seconds in the report.

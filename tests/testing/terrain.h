@@ -11,6 +11,7 @@
 #include "tests/testing/shapes.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 // Fractional Brownian motion by spectral synthesis (Voss 1985): waves in random directions, as many
 // in each octave of wavelengths from two sides of the unit square down to 1/512 of one, with

@@ -32,6 +32,7 @@
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance::testing {
+using namespace problems;
 
 inline void SetGeometry(const std::array<int, 3>& counts, const Vec3& origin, const Mat3& steps,
                         itk::ImageIOBase& io) {

@@ -8,7 +8,7 @@
 #include <future>
 #include <stop_token>
 
-namespace semblance {
+namespace semblance::problems {
 
 // HSpline: evaluate, project, edit, read and write.
 void BindSurface(pybind11::module_& module);
@@ -44,4 +44,4 @@ auto Interruptible(const Work& work) {
   return done.get();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

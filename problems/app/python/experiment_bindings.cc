@@ -19,7 +19,7 @@
 #include "problems/study/report/study_report.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace py = pybind11;
@@ -138,4 +138,4 @@ void BindExperiments(py::module_& module) {
       "installed, otherwise a list of dictionaries.");
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "problems/app/python/bindings.h"
 #include "problems/app/python/values.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace py = pybind11;
@@ -74,4 +74,4 @@ void BindFit(py::module_& module) {
              py::arg("weights") = py::none(), py::arg("threads") = 1, FitDocumentation().c_str());
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

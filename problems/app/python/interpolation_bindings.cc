@@ -5,7 +5,7 @@
 #include "problems/app/python/bindings.h"
 #include "problems/app/python/values.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace py = pybind11;
@@ -69,4 +69,4 @@ void BindInterpolation(py::module_& module) {
       "like `interp` in a configuration.");
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -3,7 +3,7 @@
 #include "problems/app/python/bindings.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Maps the program's errors to Python's. ConfigError and InputError report values that cannot be
@@ -15,16 +15,16 @@ void BindErrors(pybind11::module_& module) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
 
 PYBIND11_MODULE(semblance, module) {
   module.doc() =
       "Faces from skulls: H-splines, fits of scattered points, depths between depth markers, "
       "experiments and studies. Lengths are in mm. Arrays are NumPy arrays of doubles.";
   module.attr("__version__") = SEMBLANCE_VERSION;
-  semblance::BindErrors(module);
-  semblance::BindSurface(module);
-  semblance::BindFit(module);
-  semblance::BindInterpolation(module);
-  semblance::BindExperiments(module);
+  problems::BindErrors(module);
+  problems::BindSurface(module);
+  problems::BindFit(module);
+  problems::BindInterpolation(module);
+  problems::BindExperiments(module);
 }

@@ -12,7 +12,7 @@
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/hspline_query/tessellate.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace py = pybind11;
@@ -167,4 +167,4 @@ void BindSurface(py::module_& module) {
   BindNets(surface);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

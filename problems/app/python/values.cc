@@ -10,7 +10,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace py = pybind11;
@@ -161,4 +161,4 @@ std::string OptionText(const py::handle& value) {
       std::string(py::str(py::type::handle_of(value).attr("__name__")))));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Arguments of these types are copied to contiguous memory and converted to the number type if
 // necessary; otherwise they use the caller's memory.
@@ -39,4 +39,4 @@ Indices MakeArray(std::span<const Triangle> triangles);
 // readers of configurations check keyword arguments too. Throws InputError for any other object.
 std::string OptionText(const pybind11::handle& value);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -22,7 +22,7 @@
 #include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -594,4 +594,4 @@ void Bench::StartProposal() {
   });
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -95,7 +95,7 @@
 #include "problems/app/workbench/bench_open.h"
 #include "problems/app/workbench/bench_subject.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct BenchOptions {
   std::filesystem::path source;  // skull, volume or configuration to begin with; may be empty
@@ -231,4 +231,4 @@ class Bench {
   BenchJob job_;                            // last: destroyed and stopped first
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 void CheckSite(const std::string& site) {
@@ -198,4 +198,4 @@ BenchState ReplaceEdits(BenchState state, EditScript edits) {
   return state;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/app/workbench/bench_state.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Places the site or moves it. The site is then neither proposed nor absent. Its measurements and
 // its note stay. Its normal is dropped because the normal belonged to the former place.
@@ -62,4 +62,4 @@ BenchState ChangeFrame(BenchState state, const std::vector<std::string>& sites,
 
 BenchState ReplaceEdits(BenchState state, EditScript edits);
 
-}  // namespace semblance
+}  // namespace semblance::problems

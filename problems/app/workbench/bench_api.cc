@@ -26,7 +26,7 @@
 #include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/face_export.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -474,4 +474,4 @@ BenchReply Answer(Bench& bench, const BenchRequest& request) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

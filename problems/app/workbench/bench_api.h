@@ -8,7 +8,7 @@
 
 #include "problems/app/workbench/bench.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct BenchRequest {
   std::string method;                        // GET or POST
@@ -29,4 +29,4 @@ struct BenchReply {
 // with {"error": words}. A failure of the program gets 500 or 507.
 BenchReply Answer(Bench& bench, const BenchRequest& request);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 struct BenchAsset {
   std::string_view name;  // e.g. "main.js", "tables/rhine_caucasoid.yaml"
@@ -15,4 +15,4 @@ struct BenchAsset {
 std::span<const BenchAsset> PageFiles();     // of problems/page
 std::span<const BenchAsset> StarterFiles();  // depth tables and the depth marker network
 
-}  // namespace semblance
+}  // namespace semblance::problems

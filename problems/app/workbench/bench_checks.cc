@@ -14,7 +14,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 Vec3 ToVec3(const Landmark& l) { return {l.point[0], l.point[1], l.point[2]}; }
@@ -112,4 +112,4 @@ LandmarkFile PredictedLandmarks(const LandmarkChecks& checks) {
   return file;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

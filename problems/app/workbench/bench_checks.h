@@ -9,7 +9,7 @@
 #include "problems/subject/dowel_placement.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Distances of one landmark in mm; NaN if a distance cannot be computed.
 struct SiteCheck {
@@ -32,4 +32,4 @@ LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, co
 // The predicted points as proposed landmarks, which a person has to check.
 LandmarkFile PredictedLandmarks(const LandmarkChecks& checks);
 
-}  // namespace semblance
+}  // namespace semblance::problems

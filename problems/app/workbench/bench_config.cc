@@ -7,7 +7,7 @@
 #include "problems/config/options_reference.h"
 #include "problems/experiment/experiment_config.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -104,4 +104,4 @@ std::string ExperimentJson(const Experiment& experiment) {
   return ValueJson(MakeConfigTree(experiment), kType).dump();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

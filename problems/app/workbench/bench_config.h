@@ -11,7 +11,7 @@
 #include "problems/experiment/experiment.h"
 #include "problems/app/workbench/bench_state.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // start: text of the resolved configuration that the workbench began with. Paths in settings are
 // relative to `folder`. If the state has landmarks or edits, the experiment names the folder's
@@ -32,4 +32,4 @@ void MakeRelative(ConfigNode& tree, const std::filesystem::path& folder);
 // {path of an option: value} as one JSON object in the form of the schema's defaults.
 std::string ExperimentJson(const Experiment& experiment);
 
-}  // namespace semblance
+}  // namespace semblance::problems

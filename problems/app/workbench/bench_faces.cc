@@ -17,7 +17,7 @@
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -192,4 +192,4 @@ std::array<std::vector<Vec3>, 3> PullMoves(const HSplineSurface& face, Pull pull
   return moves;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

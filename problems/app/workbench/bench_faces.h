@@ -17,7 +17,7 @@
 #include "problems/app/workbench/bench_subject.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct BenchFace {
   HSplineSurface surface;
@@ -87,4 +87,4 @@ Vec2 NearestParameter(const HSplineSurface& face, const Vec3& at);
 // ignored. Throws as Pulled.
 std::array<std::vector<Vec3>, 3> PullMoves(const HSplineSurface& face, Pull pull, int per_patch);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -18,7 +18,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -186,4 +186,4 @@ void DropIncoming(const fs::path& root, const std::string& batch) {
 
 void DropAllIncoming(const fs::path& root) { fs::remove_all(root / kIncoming); }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "problems/experiment/experiment.h"
 #include "problems/app/workbench/bench_state.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 class BenchFolder {
  public:
@@ -89,4 +89,4 @@ std::filesystem::path FindBatch(const std::filesystem::path& root,
 void DropIncoming(const std::filesystem::path& root, const std::string& batch);
 void DropAllIncoming(const std::filesystem::path& root);
 
-}  // namespace semblance
+}  // namespace semblance::problems

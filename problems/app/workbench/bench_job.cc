@@ -5,7 +5,7 @@
 #include <new>
 #include <utility>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 double SecondsSince(std::chrono::steady_clock::time_point start) {
@@ -75,4 +75,4 @@ JobStatus BenchJob::Status() const {
   return status;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

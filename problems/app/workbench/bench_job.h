@@ -11,7 +11,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class JobState { kIdle, kRunning, kFinished, kFailed, kStopped };
 
@@ -50,4 +50,4 @@ class BenchJob {
   std::jthread thread_;
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

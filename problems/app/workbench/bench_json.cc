@@ -12,7 +12,7 @@
 #include "problems/app/workbench/bench_config.h"
 #include "surfaces/hspline_query/tessellate.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -211,4 +211,4 @@ std::string SitesJson() {
   return json.dump();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 
 #include "problems/app/workbench/bench.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Landmarks with their checks, settings, values of all options, the steps that undo and redo reach,
 // and the job.
@@ -33,4 +33,4 @@ std::string MeshesJson(const BenchSubject& subject);
 // average skull.
 std::string SitesJson();
 
-}  // namespace semblance
+}  // namespace semblance::problems

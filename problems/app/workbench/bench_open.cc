@@ -25,7 +25,7 @@
 #include "surfaces/base/lower_case.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -469,4 +469,4 @@ void OpenImportedFile(const OpenRequest& request, const OpenBase& base, const Ru
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

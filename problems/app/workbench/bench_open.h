@@ -14,7 +14,7 @@
 #include "problems/app/workbench/bench_folder.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class ImportKind { kMesh, kVolume, kConfig, kLandmarks };
 constexpr auto EnumNames(ImportKind) {
@@ -73,4 +73,4 @@ struct Opened {
 void OpenImportedFile(const OpenRequest& request, const OpenBase& base, const RunContext& context,
                       const std::function<void(Opened)>& commit);
 
-}  // namespace semblance
+}  // namespace semblance::problems

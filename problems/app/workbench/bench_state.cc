@@ -10,7 +10,7 @@
 
 #include "problems/config/config.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct EditedVertex {
@@ -203,4 +203,4 @@ BenchHistory HistoryFromText(std::string_view text, const std::string& name) {
   return history;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

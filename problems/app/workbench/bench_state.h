@@ -15,7 +15,7 @@
 #include "problems/subject/landmarks.h"
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A landmark with the fields of Landmark (landmarks.h).
 struct BenchLandmark {
@@ -132,4 +132,4 @@ BenchHistory Redone(BenchHistory history);
 std::string HistoryText(const BenchHistory& history);
 BenchHistory HistoryFromText(std::string_view text, const std::string& name);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -193,4 +193,4 @@ BenchBeginning BeginBench(const fs::path& source, const fs::path& folder,
   return beginning;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "problems/app/workbench/bench_state.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct BenchMesh {
   TriMesh mesh;  // in full
@@ -57,4 +57,4 @@ BenchBeginning BeginFromConfig(const std::filesystem::path& config,
 BenchBeginning BeginBench(const std::filesystem::path& source, const std::filesystem::path& folder,
                           const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

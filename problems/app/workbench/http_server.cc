@@ -19,7 +19,7 @@
 #include "problems/app/workbench/bench_api.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr const char* kHost = "127.0.0.1";
@@ -234,4 +234,4 @@ std::string RandomToken() {
   return token;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 
 #include "problems/app/workbench/bench.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct HttpServerOptions {
   int port = 0;                              // of 127.0.0.1; 0: any free port
@@ -45,4 +45,4 @@ class HttpServer {
 // has no such source.
 std::string RandomToken();
 
-}  // namespace semblance
+}  // namespace semblance::problems

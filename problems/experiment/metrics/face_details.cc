@@ -13,7 +13,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr double kBehind_mm = 30, kFurthest_mm = 60;  // as the header states
@@ -225,4 +225,4 @@ std::string InWords(const ScoredSkin& skin) {
                      AreaWithStatus(skin, SkinStatus::kScored), left_out);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -21,7 +21,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // ---------------------------------------------------------------------------------------------
 // Errors at named points
@@ -104,4 +104,4 @@ nlohmann::ordered_json ScoreToJson(const FaceMetrics& metrics, const FaceDetails
 // "312 cm² of skin scored; left out: 20 cm² masked, 156 cm² inner, 14 cm² end".
 std::string InWords(const ScoredSkin& skin);
 
-}  // namespace semblance
+}  // namespace semblance::problems

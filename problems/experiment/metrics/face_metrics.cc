@@ -12,7 +12,7 @@
 #include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 struct Corner {
@@ -386,4 +386,4 @@ Json MetricsToJson(const FaceMetrics& metrics) {
   return json;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

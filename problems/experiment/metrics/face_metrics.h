@@ -14,7 +14,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // ---------------------------------------------------------------------------------------------
 // Volume
@@ -127,4 +127,4 @@ std::vector<bool> ComparableTriangles(const TriMesh& outer_surface, const FaceRe
 nlohmann::ordered_json SummaryToJson(const DistanceSummary& summary);
 nlohmann::ordered_json MetricsToJson(const FaceMetrics& metrics);
 
-}  // namespace semblance
+}  // namespace semblance::problems

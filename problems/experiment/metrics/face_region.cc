@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 TriMesh NetworkMesh(std::span<const Dowel> dowels, const DowelNetwork& network) {
@@ -241,4 +241,4 @@ ScoredSkin AllScored(const TriMesh& skin) {
   return scored;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

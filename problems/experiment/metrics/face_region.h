@@ -17,7 +17,7 @@
 #include "surfaces/mesh/cut_planes.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // ---------------------------------------------------------------------------------------------
 // Options
@@ -173,4 +173,4 @@ ScoredSkin FindScoredSkin(const TriMesh& skin, const OuterSkin& outer, const Sku
 // Scores the whole mesh, without parts: for meshes without landmarks.
 ScoredSkin AllScored(const TriMesh& skin);
 
-}  // namespace semblance
+}  // namespace semblance::problems

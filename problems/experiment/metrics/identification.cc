@@ -13,7 +13,7 @@
 #include "surfaces/base/random.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 double OrLargest(double distance_mm) {
@@ -96,4 +96,4 @@ ProbeFace SimulateRescan(const KnownFace& known, double cell_mm, double noise_mm
   return again;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

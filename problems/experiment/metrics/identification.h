@@ -12,7 +12,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The place of `own` in the gallery sorted by distance: 1 + the number of closer persons + half of
 // the number of equally close ones, so that a gallery of equals gives the mean rank. A distance
@@ -60,4 +60,4 @@ FaceDistance MeasureFaceDistance(const ProbeFace& probe, const KnownFace& known,
 ProbeFace SimulateRescan(const KnownFace& known, double cell_mm, double noise_mm,
                     std::uint64_t random_seed);
 
-}  // namespace semblance
+}  // namespace semblance::problems

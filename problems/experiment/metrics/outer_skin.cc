@@ -11,7 +11,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Cell = std::array<int, 3>;
@@ -211,4 +211,4 @@ OuterSkin FindOuterSkin(const TriMesh& skin, double probe_mm) {
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "surfaces/mesh/cut_planes.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct OuterSkin {
   std::vector<bool> outer;     // one per vertex
@@ -25,4 +25,4 @@ struct OuterSkin {
 // mesh has no triangle, is not finite, or is more than 1000 probes long.
 OuterSkin FindOuterSkin(const TriMesh& skin, double probe_mm);
 
-}  // namespace semblance
+}  // namespace semblance::problems

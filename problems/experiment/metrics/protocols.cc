@@ -9,7 +9,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Motion = Eigen::Matrix<double, 6, 1>;  // turn (radians about a middle), then shift
@@ -174,4 +174,4 @@ ViewRayScore ScoreAlongView(const TriMesh& truth, const FaceRegion& region, cons
   return score;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -5,7 +5,7 @@
 
 #include "problems/experiment/metrics/face_metrics.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The score after the rigid motion that brings the face closest to the scored skin (Lee et al.
 // 2012, Miranda et al. 2018). It hides an error of pose.
@@ -36,4 +36,4 @@ BestFitScore ScoreBestFit(const TriMesh& truth, const FaceRegion& region, const 
 ViewRayScore ScoreAlongView(const TriMesh& truth, const FaceRegion& region, const TriMesh& face,
                             const Vec3& to_front, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

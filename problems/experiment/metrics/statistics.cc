@@ -14,7 +14,7 @@
 #include "surfaces/base/quantile.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 double Rounded(double x) { return std::round(x * 1e9) / 1e9; }
@@ -236,4 +236,4 @@ FriedmanResult Friedman(const std::vector<std::vector<double>>& values) {
   return r;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct Interval {
   double low = kNaN;
@@ -63,4 +63,4 @@ struct FriedmanResult {
 // Throws InputError for fewer than 2 subjects or treatments, or rows of different lengths.
 FriedmanResult Friedman(const std::vector<std::vector<double>>& values);
 
-}  // namespace semblance
+}  // namespace semblance::problems

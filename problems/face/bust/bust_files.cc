@@ -14,7 +14,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh_files/glb.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -251,4 +251,4 @@ std::vector<NamedBytes> BustToFiles(const Bust& bust, const BustModel& model) {
   return files;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 
 #include "problems/face/bust/pose_bust.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct NamedBytes {
   std::string name;
@@ -21,4 +21,4 @@ struct NamedBytes {
 // IoError if a texture can no longer be read, and InputError if it is no PNG or JPEG any more.
 std::vector<NamedBytes> BustToFiles(const Bust& bust, const BustModel& model);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -18,7 +18,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -144,4 +144,4 @@ std::vector<fs::path> BustFiles(const BustSource& source) {
   return {};
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // `ict` if the template is `ict`, else none.
 struct AutoBust {
@@ -92,4 +92,4 @@ std::optional<BustModel> LoadBust(const BustSource& source, const TemplateSource
 // The files that LoadBust reads, for the manifest.
 std::vector<std::filesystem::path> BustFiles(const BustSource& source);
 
-}  // namespace semblance
+}  // namespace semblance::problems

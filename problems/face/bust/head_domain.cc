@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr double kTurn = 2 * std::numbers::pi;
@@ -406,4 +406,4 @@ HeadSamples SampleHead(const HeadDomain& head, int columns, int rows) {
   return std::move(sampler).Samples();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The head's mesh with its holes closed, and the (u,v) of its points. u goes round the head, from
 // the back (0) over the subject's right side, the face (0.5) and the left side (1 is 0 again). v
@@ -36,4 +36,4 @@ struct HeadSamples {
 // corners a triangle is curved to meet their normals (PN triangles, Vlachos et al. 2001).
 HeadSamples SampleHead(const HeadDomain& head, int columns, int rows);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "surfaces/base/lower_case.h"
 #include "surfaces/mesh_files/glb.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -388,4 +388,4 @@ std::string JoinMtl(const ObjText& obj) {
   return text;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ObjMaterial {
   Vec3 colour = Vec3::Constant(0.8);  // Kd, 0..1
@@ -68,4 +68,4 @@ std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
 // The material libraries joined into one, with the textures' names in the folder of a run.
 std::string JoinMtl(const ObjText& obj);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -21,7 +21,7 @@
 #include "surfaces/mesh/correspondences.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kQuadsPerPatch = 4;
@@ -451,4 +451,4 @@ Bust PoseBust(const BustInput& in, const RunContext& context) {
   return BustPoser(in, context).Pose();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

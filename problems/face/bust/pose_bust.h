@@ -11,7 +11,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/hspline/hspline_surface.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct BustInput {
   const BustModel& model;
@@ -46,4 +46,4 @@ struct Bust {
 // face.
 Bust PoseBust(const BustInput& in, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

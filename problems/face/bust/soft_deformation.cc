@@ -6,7 +6,7 @@
 #include "interp/on_surface/mesh_laplacian.h"
 #include "interp/on_surface/mesh_solver.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 SoftDeformation::SoftDeformation(const TriMesh& mesh, const DeformOptions& options)
     : points_(mesh.points) {
@@ -56,4 +56,4 @@ std::vector<std::int32_t> TurnedOver(const TriMesh& before, const TriMesh& after
   return turned;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct SoftTarget {
   std::int32_t vertex = -1;
@@ -51,4 +51,4 @@ class SoftDeformation {
 std::vector<std::int32_t> TurnedOver(const TriMesh& before, const TriMesh& after,
                                      const Mat3& rotation);
 
-}  // namespace semblance
+}  // namespace semblance::problems

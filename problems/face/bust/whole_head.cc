@@ -20,7 +20,7 @@
 #include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/hspline_json.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using json_parts::Json;
@@ -258,4 +258,4 @@ TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows) {
   return mesh;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

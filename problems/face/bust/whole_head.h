@@ -10,7 +10,7 @@
 #include "surfaces/hspline/hspline_surface.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // In mm, LPS. u goes round the head, from the back (0) over the face (0.5). v goes from the end of
 // the neck (0) to the crown (1), where all u meet. Behind the lids and the lips the surface turns
@@ -41,4 +41,4 @@ WholeHead WholeHeadFromJson(std::string_view text, const std::string& name);
 // have fewer points. A fan replaces the last rings, whose points would crowd together.
 TriMesh WholeHeadMesh(const WholeHead& head, int columns, int rows);
 
-}  // namespace semblance
+}  // namespace semblance::problems

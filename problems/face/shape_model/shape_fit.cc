@@ -23,7 +23,7 @@
 #include "surfaces/base/farthest_first.h"
 #include "surfaces/mesh/correspondences.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kPoseRounds = 2;              // first rounds, which move the pose alone
@@ -503,4 +503,4 @@ ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,
   return estimator.Result(context);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

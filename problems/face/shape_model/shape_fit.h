@@ -13,7 +13,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ShapeFitOptions {
   double tip_normal_sd_mm = 0.5;
@@ -238,4 +238,4 @@ struct ShapeEstimate {
 ShapeEstimate EstimateShape(const ShapeModel& model, const ShapeTarget& target,
                             const ShapeFitOptions& options, const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 [[noreturn]] void Fail(std::string_view name, const std::string& what) {
@@ -197,4 +197,4 @@ std::vector<Vec3> PlacedPoints(const ShapeFrame& frame, const ShapeModel& model,
   return points;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ShapeModel {
   TriMesh mean;           // n points, mm; triangles face outward
@@ -98,4 +98,4 @@ Eigen::RowVectorXd DerivativeAlong(const Vec3& direction, const ShapeRow& row,
 std::vector<Vec3> PlacedPoints(const ShapeFrame& frame, const ShapeModel& model,
                                const Eigen::MatrixXd& field, const ShapeParameters& parameters);
 
-}  // namespace semblance
+}  // namespace semblance::problems

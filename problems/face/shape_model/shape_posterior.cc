@@ -8,7 +8,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 Eigen::Matrix3d MakeWhitening(const PointSpread& s) {
   const auto square = [](double x) { return x * x; };
@@ -141,4 +141,4 @@ ShapeParameters DrawParameters(const ShapeParameters& parameters, const ShapePos
   return drawn;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

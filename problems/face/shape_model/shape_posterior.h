@@ -10,7 +10,7 @@
 
 #include "problems/face/shape_model/shape_model.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // An observation of one point x of the shape. Its cost is weight * Huber_width(|whitening (x -
 // position)|^2), with Huber_w(s) = s for s <= w^2, else 2 w sqrt(s) - w^2.
@@ -82,4 +82,4 @@ std::vector<double> DeviationsAlong(const ShapeFrame& frame, const ShapeParamete
 ShapeParameters DrawParameters(const ShapeParameters& parameters, const ShapePosterior& posterior,
                                std::uint64_t random_seed);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 double KernelAt(double squared_mm, const SmoothFieldOptions& o) {
@@ -54,4 +54,4 @@ Eigen::MatrixXd SmoothFieldFactor(std::span<const Vec3> points, std::span<const 
   return factor.matrixL().solve(across.transpose()).transpose();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

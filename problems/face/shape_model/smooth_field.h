@@ -9,7 +9,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct SmoothFieldOptions {
   int centres = 110;
@@ -75,4 +75,4 @@ Eigen::MatrixXd SmoothFieldFactor(std::span<const Vec3> points, std::span<const 
                                   std::span<const Vec3> features,
                                   const SmoothFieldOptions& options);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -25,7 +25,7 @@
 extern "C" void __gcov_dump();
 #endif
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // A message in the pipe: its kind (1 byte), its length (8 bytes), and its content.
@@ -252,4 +252,4 @@ std::string RunInChildProcess(const std::function<std::string(const ReportFile&)
   return ResultOrThrow(ParseMessages(bytes));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

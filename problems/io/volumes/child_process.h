@@ -7,7 +7,7 @@
 #include <stop_token>
 #include <string>
 
-namespace semblance {
+namespace semblance::problems {
 
 // The work calls this with the name of each file before it reads the file.
 using ReportFile = std::function<void(const std::string& file)>;
@@ -21,4 +21,4 @@ using ReportFile = std::function<void(const std::string& file)>;
 std::string RunInChildProcess(const std::function<std::string(const ReportFile&)>& work,
                               double memory_bytes, const std::stop_token& stop);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 void CheckVolumeClaim(const VolumeClaim& claim, const std::string& where) {
   // Above gzip's largest compression ratio, 1032, with a margin for other methods.
@@ -255,4 +255,4 @@ CtVolume MakeCoarserVolume(const CtVolume& volume, const CoarserVoxels& voxels, 
   return coarser;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The axes are as near to those of LPS as the scan allows: slices run from the feet upwards, rows
 // from the front to the back, columns from the subject's right to the left.
@@ -110,4 +110,4 @@ bool IsFinerThan(const CtVolume& volume, const CoarserVoxels& voxels);
 // dropped. Throws InputError if fewer than 2 new voxels fit along an axis.
 CtVolume MakeCoarserVolume(const CtVolume& volume, const CoarserVoxels& voxels, int threads);
 
-}  // namespace semblance
+}  // namespace semblance::problems

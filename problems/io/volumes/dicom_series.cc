@@ -12,7 +12,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr std::size_t kMinHeadSlices = 8;  // scout images have fewer
@@ -330,4 +330,4 @@ double TiltDeg(const SliceStack& stack, const Vec3& normal) {
   return std::acos(cosine) * 180 / std::numbers::pi;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "problems/io/volumes/itk_files.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Slices of one series, one size and one direction. A scout image within a series is a DicomSeries
 // of its own.
@@ -61,4 +61,4 @@ SliceStack StackSlices(std::span<const Vec3> positions, const Vec3& normal,
 // The angle between the stack's step and the slices' normal, deg; 0 without gantry tilt.
 double TiltDeg(const SliceStack& stack, const Vec3& normal);
 
-}  // namespace semblance
+}  // namespace semblance::problems

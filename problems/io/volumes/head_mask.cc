@@ -9,7 +9,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Throws InputError with the message if the mask is empty.
@@ -196,4 +196,4 @@ HeadMask FindHeadMask(const CtVolume& volume, const HeadMaskOptions& options,
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

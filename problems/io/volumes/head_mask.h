@@ -9,7 +9,7 @@
 #include "problems/io/volumes/ct_volume.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct HeadMaskOptions {
   double skin_value = kNaN;       // voxels of at least this value are tissue, bone or furniture
@@ -36,4 +36,4 @@ VoxelMask And(VoxelMask a, const VoxelMask& b);
 HeadMask FindHeadMask(const CtVolume& volume, const HeadMaskOptions& options,
                       const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_check.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Throws InputError if this is shorter than any head: then the unit of the file's lengths is
@@ -254,4 +254,4 @@ MrSkin ImportMrSkin(const CtVolume& volume, const MrSkinOptions& options,
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class CtEdges { kThreshold, kHalfMaximum };
 constexpr auto EnumNames(CtEdges) {
@@ -128,4 +128,4 @@ double OtsuThreshold(const CtVolume& volume);
 MrSkin ImportMrSkin(const CtVolume& volume, const MrSkinOptions& options,
                     const RunContext& context);
 
-}  // namespace semblance
+}  // namespace semblance::problems

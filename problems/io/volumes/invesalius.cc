@@ -16,7 +16,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Limits of a damaged or hostile file; real projects are far below them.
@@ -194,4 +194,4 @@ CtVolume ReadInvesalius(const std::filesystem::path& path) {
   return volume;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

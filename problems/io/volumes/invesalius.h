@@ -6,7 +6,7 @@
 
 #include "problems/io/volumes/ct_volume.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Reads an InVesalius project (.inv3: a tar, gzipped or not, of `main.plist` and the matrix that it
 // names). The project has no origin, so the frame begins at the first column (x = 0, upwards to the
@@ -16,4 +16,4 @@ namespace semblance {
 // spacing.
 CtVolume ReadInvesalius(const std::filesystem::path& path);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -24,7 +24,7 @@
 #include "problems/io/volumes/volume_headers.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Both libraries also print their errors to the terminal.
@@ -508,4 +508,4 @@ void WriteImageVolume(const CtVolume& volume, const std::filesystem::path& file,
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

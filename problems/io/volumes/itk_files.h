@@ -13,7 +13,7 @@
 
 #include "problems/io/volumes/ct_volume.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 enum class VolumeFormat { kNifti, kNrrd, kMetaImage };
 
@@ -51,4 +51,4 @@ std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSerie
 void WriteImageVolume(const CtVolume& volume, const std::filesystem::path& file,
                       VolumeFormat format);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -5,7 +5,7 @@
 #include "problems/io/volumes/itk_files.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 [[noreturn]] void ThrowNoItk(const std::string& what) {
@@ -35,4 +35,4 @@ std::string EncodeDicomSlice(const CtVolume&, int, const DicomSeriesNames&) {
   ThrowNoItk("DICOM files");
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

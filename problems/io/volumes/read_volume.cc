@@ -24,7 +24,7 @@
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/lower_case.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -442,4 +442,4 @@ VolumeReading ReadVolume(const fs::path& path, const ReadVolumeOptions& options,
   return ReadFile(path, context);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/io/volumes/itk_files.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ReadVolumeOptions {
   std::string series;        // UID or number in a DICOM folder; empty if there is only one series
@@ -42,4 +42,4 @@ std::optional<VolumeFormat> FindVolumeFormat(const std::filesystem::path& file);
 // The files that ReadVolume reads: the path itself, or all files below the folder, sorted.
 std::vector<std::filesystem::path> VolumeFiles(const std::filesystem::path& path);
 
-}  // namespace semblance
+}  // namespace semblance::problems

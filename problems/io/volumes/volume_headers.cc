@@ -24,7 +24,7 @@
 #include "surfaces/base/lower_case.h"
 #include "surfaces/mesh_files/text_lines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // ---------------------------------------------------------------------------------------------
@@ -417,4 +417,4 @@ void CheckNiftiWhole(const std::filesystem::path& file, double voxels) {
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

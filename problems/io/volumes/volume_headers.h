@@ -12,7 +12,7 @@
 #include "problems/io/volumes/ct_volume.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct HeaderPlace {
   // Columns: from a voxel to the next along each axis, LPS, in the file's unit. Empty: ITK's steps
@@ -54,4 +54,4 @@ bool NiftiHasPlace(const std::filesystem::path& file);
 // a voxel as stored in the file; ITK's size differs if there is a slope.
 void CheckNiftiWhole(const std::filesystem::path& file, double voxels);
 
-}  // namespace semblance
+}  // namespace semblance::problems

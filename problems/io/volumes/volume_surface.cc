@@ -8,7 +8,7 @@
 #include "surfaces/implicit_face.h"
 #include "surfaces/marching/polygonize.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The values along a line through p, from -reach (inside) to +reach.
@@ -128,4 +128,4 @@ double MoveToHalfMaximum(const CtVolume& volume, const HalfMaximumOptions& optio
   return moves.empty() ? 0 : sum / static_cast<double>(moves.size());
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

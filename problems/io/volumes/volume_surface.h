@@ -9,7 +9,7 @@
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The surface on which value_of(index of the voxel) equals `threshold`: LPS, mm, outward from
 // higher values, open where the volume ends. Exact for axes of any direction, skew ones too,
@@ -38,4 +38,4 @@ struct HalfMaximumOptions {
 double MoveToHalfMaximum(const CtVolume& volume, const HalfMaximumOptions& options,
                          const RunContext& context, TriMesh& mesh);
 
-}  // namespace semblance
+}  // namespace semblance::problems

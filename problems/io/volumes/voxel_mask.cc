@@ -9,7 +9,7 @@
 
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 const float kFar = std::numeric_limits<float>::infinity();
@@ -229,4 +229,4 @@ VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_m
   return grown;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

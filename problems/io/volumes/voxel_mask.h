@@ -8,7 +8,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The size and spacing of a regular grid; its first axis runs fastest.
 struct VoxelGrid {
@@ -53,4 +53,4 @@ VoxelMask Flood(const VoxelMask& allowed, const VoxelMask& starts, const VoxelGr
 // for axes at right angles.
 VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_mm, int threads);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/srgb.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Triple = Eigen::Vector3d;
@@ -100,4 +100,4 @@ std::vector<std::string> ColourSteps(const ColourMap& map) {
   return colours;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

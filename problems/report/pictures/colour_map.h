@@ -8,7 +8,7 @@
 
 #include "problems/report/pictures/image.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Values between low_mm and high_mm spread over evenly spaced control colours, interpolated in
 // OKLab (Ottosson 2020), where equal steps look equal. Values beyond the ends take the end's
@@ -44,4 +44,4 @@ struct Legend {
   bool shows_no_data = true;  // adds a swatch for "no data"
 };
 
-}  // namespace semblance
+}  // namespace semblance::problems

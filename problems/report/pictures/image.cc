@@ -10,7 +10,7 @@
 #include "problems/io/output_folder.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::uint8_t Byte(double value) {
@@ -141,4 +141,4 @@ std::string EncodePng(const Image& image, PngEffort effort) {
   return bytes;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

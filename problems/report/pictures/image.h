@@ -9,7 +9,7 @@
 
 #include "surfaces/base/fields.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // sRGB-encoded, each 0..1.
 struct Colour {
@@ -57,4 +57,4 @@ enum class PngEffort { kSmall, kQuick };
 // and no comment. Throws InputError for a picture without pixels.
 std::string EncodePng(const Image& image, PngEffort effort = PngEffort::kSmall);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include "problems/report/pictures/raster.h"
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Trades smooth shadows against time: each light costs a depth map, which all pictures share.
@@ -239,4 +239,4 @@ void LightVertices(const Scene& scene, const std::vector<Light>& lights, int thr
   });
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/report/pictures/raster.h"
 #include "problems/report/pictures/render.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 using Rgb = Eigen::Array3f;  // linear light
 
@@ -68,4 +68,4 @@ struct ShadowMaps {
 void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
                    ShadowMaps& maps, FlatScene& flat);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "surfaces/mesh/mesh_primitives.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 SceneObject SkullObject(TriMesh mesh) {
   return {.mesh = std::move(mesh), .material = BoneMaterial()};
 }
@@ -86,4 +86,4 @@ Image RenderViews(const Scene& scene, const Box3& region, std::span<const View> 
       RenderAll(scene, CamerasFor(views, region, aspect), options, shadows, threads));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "problems/report/pictures/colour_map.h"
 #include "problems/report/pictures/render.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 SceneObject SkullObject(TriMesh mesh);
 SceneObject SkinObject(TriMesh mesh, double opacity = 1);
@@ -38,4 +38,4 @@ std::vector<Camera> CamerasFor(std::span<const View> views, const Box3& region, 
 Image RenderViews(const Scene& scene, const Box3& region, std::span<const View> views,
                   const RenderOptions& options, int threads);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 inline constexpr std::int64_t kSubsamples = 256;  // steps per sample
 
@@ -111,4 +111,4 @@ void VisitSamples(const RasterPoint& a, const RasterPoint& b, const RasterPoint&
   }
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh_files/srgb.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kBandRows = 16;  // pixel rows per task of a thread
@@ -437,4 +437,4 @@ Image Render(const Scene& scene, const Camera& camera, const RenderOptions& opti
   return std::move(RenderAll(scene, {&camera, 1}, options, shadows, threads).front());
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ShadowMaps;
 
@@ -101,4 +101,4 @@ Image Render(const Scene& scene, const Camera& camera, const RenderOptions& opti
 std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
                              const RenderOptions& options, ShadowMaps& shadows, int threads);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kSiteWidth = 460, kSiteHeight = 540;
@@ -260,4 +260,4 @@ Image DrawSitePicture(const SiteSketch& sketch, std::string_view code) {
   return both;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "problems/report/pictures/image.h"
 #include "problems/report/pictures/render.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The skull from the front and from its left as an SVG file that embeds the rendered pictures, with
 // the standard sites as dots and their numbers as text.
@@ -34,4 +34,4 @@ SiteSketch MakeSiteSketch(int threads);
 // small discs. Throws InputError for a site that is in neither list.
 Image DrawSitePicture(const SiteSketch& sketch, std::string_view site);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -156,4 +156,4 @@ Image TemplatePicture(const TemplateFit& fit, const OuterHead& head, int threads
   return ContactSheet(pictures);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 #include "problems/face/template_fit.h"
 #include "problems/report/pictures/image.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // {"tolerance_mm", "met", "folds", "face_to_skin": {rms_mm, p95_mm, max_mm, covered, area_mm2},
 // "skin_to_face": {...}, "levels": [...], "sites": {code: {u, v, from_landmark, drift_mm,
@@ -22,4 +22,4 @@ std::string TemplateText(const TemplateFit& fit, const TemplateFitOptions& optio
 // the face lies outside (+) or inside (-) the skin. The sites are dots on the face.
 Image TemplatePicture(const TemplateFit& fit, const OuterHead& head, int threads);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "problems/report/plots/svg_parts.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Sizes in pixels: labels on the left, height of a row, names of the columns, whole map, widest
@@ -111,4 +111,4 @@ std::string HeatMapSvg(const HeatMap& map) {
   return text + svg::Text(kMargin, bottom + 24, map.title + ends, "start") + "</svg>\n";
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

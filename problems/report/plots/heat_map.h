@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 
 struct HeatMap {
   std::vector<std::string> rows, columns;
@@ -19,4 +19,4 @@ struct HeatMap {
 // InputError if a row does not have one value per column.
 std::string HeatMapSvg(const HeatMap& map);
 
-}  // namespace semblance
+}  // namespace semblance::problems

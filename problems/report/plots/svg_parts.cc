@@ -8,7 +8,7 @@
 #include <cmath>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Shortens a text to `most` bytes without cutting a UTF-8 character in half.
@@ -115,4 +115,4 @@ std::string Shortened(const std::string& label) {
 }
 
 }  // namespace svg
-}  // namespace semblance
+}  // namespace semblance::problems

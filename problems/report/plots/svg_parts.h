@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-namespace semblance {
+namespace semblance::problems {
 
 // & < > " ' become entities. A control character that HTML forbids becomes a replacement character.
 std::string EscapeHtml(std::string_view text);
@@ -40,4 +40,4 @@ std::string Title(const std::string& text);
 std::string Shortened(const std::string& label);
 
 }  // namespace svg
-}  // namespace semblance
+}  // namespace semblance::problems

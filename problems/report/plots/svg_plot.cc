@@ -13,7 +13,7 @@
 #include "problems/report/plots/svg_parts.h"
 #include "surfaces/base/quantile.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using svg::kColours;
@@ -563,4 +563,4 @@ std::string HistogramSvg(std::span<const double> values, const std::vector<Histo
          "</svg>\n";
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 
 // One row of a plot.
 struct BoxRow {
@@ -81,4 +81,4 @@ std::string HistogramSvg(std::span<const double> values, const std::vector<Histo
 // A round step for about `count` ticks over [low, high]: 1, 2 or 5 times a power of ten.
 double TickStep(double low, double high, int count);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/decimate/decimate.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Keeps one vertex per cell of a grid.
@@ -172,4 +172,4 @@ TriMesh DecodeMeshBlob(const Json& blob) {
   return mesh;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 inline constexpr int kViewTriangles = 24000;  // enough for one mesh of a report on a screen
 
@@ -49,4 +49,4 @@ nlohmann::ordered_json EncodeMeshBlob(const TriMesh& mesh);
 // exception of the JSON library, if the blob is not a mesh.
 TriMesh DecodeMeshBlob(const nlohmann::ordered_json& blob);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/report/report_kit.h"
 #include "surfaces/base/csv.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::string FullLabel(const ComparedTreatment& treatment) {
@@ -139,4 +139,4 @@ void WriteComparison(const StudyComparison& comparison, OutputFolder& folder) {
   folder.Write("report.html", ReportHtml(MakeReport(comparison)));
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

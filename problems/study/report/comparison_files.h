@@ -7,7 +7,7 @@
 #include "problems/study/report/study_comparison.h"
 #include "problems/io/output_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // For a terminal: one line per treatment, then one per pair.
 std::string ComparisonText(const StudyComparison& comparison);
@@ -22,4 +22,4 @@ std::string ComparedCsv(const StudyComparison& comparison);
 // Writes pairs.csv, values.csv and report.html.
 void WriteComparison(const StudyComparison& comparison, OutputFolder& folder);
 
-}  // namespace semblance
+}  // namespace semblance::problems

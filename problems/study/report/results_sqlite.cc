@@ -13,7 +13,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr const char* kTables = R"sql(
@@ -147,4 +147,4 @@ std::string ResultsSqlite(const StudyResults& results) {
   return database.Bytes();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

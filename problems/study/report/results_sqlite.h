@@ -6,7 +6,7 @@
 
 #include "problems/study/study_tables.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The bytes of an SQLite file with STRICT tables, the same for the same results:
 //   study(title, plan, metric)                    one row
@@ -18,4 +18,4 @@ namespace semblance {
 // Throws InputError if SQLite fails.
 std::string ResultsSqlite(const StudyResults& results);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "problems/study/study_metrics.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -358,4 +358,4 @@ std::string RankText(const RankAgreement& agreement) {
                             agreement.treatments.size(), agreement.spearman);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "problems/study/study_file.h"
 #include "problems/study/study_tables.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct NamedStudy {
   std::string name;  // unique
@@ -95,4 +95,4 @@ RankAgreement CompareRanks(const NamedStudy& reference, const NamedStudy& other,
 // For a terminal: one line per treatment, then the correlation.
 std::string RankText(const RankAgreement& agreement);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "problems/report/plain_names.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 double MeanOverSubjects(const Treatment& treatment) {
   double sum = 0;
@@ -86,4 +86,4 @@ std::string RankingText(const StudyResults& results) {
   return text;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 
 #include "problems/study/study_tables.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // The metric's mean over subjects. NaN without subjects.
 double MeanOverSubjects(const Treatment& treatment);
@@ -31,4 +31,4 @@ std::string LabelPartsText(const StudyResults& results);
 // twenty and counts the others. Empty if no trial has a value.
 std::string RankingText(const StudyResults& results);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -21,7 +21,7 @@
 #include "problems/study/report/study_sections.h"
 #include "surfaces/base/parallel.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr std::size_t kLargestSceneCount = 40;  // entries of one selection list
@@ -462,4 +462,4 @@ StudyResults WriteStudyTables(OutputFolder& folder) {
   return results;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

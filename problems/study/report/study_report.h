@@ -5,7 +5,7 @@
 #include "problems/io/output_folder.h"
 #include "problems/study/study_tables.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Writes trials.csv, summary.csv, results.sqlite and report.html of the trials that the folder
 // holds so far; notes count the missing ones. The report ranks the treatments by the study's
@@ -15,4 +15,4 @@ namespace semblance {
 // as ReadStudyResults.
 StudyResults WriteStudyTables(OutputFolder& folder);
 
-}  // namespace semblance
+}  // namespace semblance::problems

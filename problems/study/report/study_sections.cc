@@ -17,7 +17,7 @@
 #include "problems/study/report/study_ranking.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 // ---------------------------------------------------------------------------------------------
 // Charts
 // ---------------------------------------------------------------------------------------------
@@ -559,4 +559,4 @@ std::vector<ReportSection> IdentifySections(const StudyResults& results,
   return sections;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

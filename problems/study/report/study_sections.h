@@ -8,7 +8,7 @@
 #include "problems/report/report_kit.h"
 #include "problems/study/study_tables.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A plot for each axis whose values are all numbers and at least two: the metric's mean over
 // subjects, one line for each combination of the other axes.
@@ -43,4 +43,4 @@ std::vector<ReportTable> Subtables(const StudyResults& results,
 std::vector<ReportSection> IdentifySections(const StudyResults& results,
                                             const std::vector<Treatment>& ranked);
 
-}  // namespace semblance
+}  // namespace semblance::problems

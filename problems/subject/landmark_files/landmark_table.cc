@@ -13,7 +13,7 @@
 #include "surfaces/base/csv.h"
 #include "surfaces/base/lower_case.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // Finds columns by name and remembers which were used.
@@ -175,4 +175,4 @@ std::string LandmarkTable(const LandmarkFile& file) {
   return table.Text();
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

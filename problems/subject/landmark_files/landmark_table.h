@@ -8,7 +8,7 @@
 
 #include "problems/subject/landmarks.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Reads one landmark per row. The columns are found by name, in any order and letter case: the site
 // (site, landmark, label or name), x, y, z (also x_mm ...), and optionally normal_x, normal_y,
@@ -23,4 +23,4 @@ LandmarkFile ParseLandmarkTable(std::string_view text, std::string_view file,
 // Writes a table with commas, decimal points and all columns. Absent sites are lost.
 std::string LandmarkTable(const LandmarkFile& file);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using json_parts::Json;
@@ -173,4 +173,4 @@ std::string MarkupsJson(const LandmarkFile& file) {
   return json.dump(2) + "\n";
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 
 #include "problems/subject/landmarks.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Reads the control points of all markups in the file, in order. Names become `site`, descriptions
 // `note`; coordinates stay as they are. `axes` is LPS or RAS as the file states. A point that is
@@ -20,4 +20,4 @@ LandmarkFile ParseMarkupsJson(std::string_view text, std::string_view file);
 // Writes one markup of points in LPS. Normals, depths and certainties are lost.
 std::string MarkupsJson(const LandmarkFile& file);
 
-}  // namespace semblance
+}  // namespace semblance::problems

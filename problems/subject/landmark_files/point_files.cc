@@ -16,7 +16,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr std::string_view kBlanks = " \t\r\n";
@@ -323,4 +323,4 @@ LandmarkFile ParsePointList(std::string_view text, std::string_view file) {
   return result;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

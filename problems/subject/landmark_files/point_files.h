@@ -9,7 +9,7 @@
 
 #include "problems/subject/landmarks.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Reads a fiducial list. Labels become `site`, descriptions `note`; coordinates stay as they are.
 // `axes` is LPS or RAS as the header states (old files have numbers: 0 is RAS, 1 is LPS). Throws
@@ -35,4 +35,4 @@ std::string MeshLabPoints(const LandmarkFile& file);
 // a missing name or an empty entry.
 LandmarkFile ParsePointList(std::string_view text, std::string_view file);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -259,4 +259,4 @@ std::vector<std::string> LostContents(const LandmarkFile& file, const fs::path& 
   return lost;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

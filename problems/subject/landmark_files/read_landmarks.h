@@ -9,7 +9,7 @@
 
 #include "problems/subject/landmarks.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ReadLandmarksOptions {
   std::optional<Axes> axes;  // axes of a file that does not state them; none: LPS, with a note
@@ -42,4 +42,4 @@ std::string WrittenAxes(const LandmarkFile& file, const std::filesystem::path& p
 // Lists, a line each, the contents of `file` that are lost in the format; empty if nothing is lost.
 std::vector<std::string> LostContents(const LandmarkFile& file, const std::filesystem::path& path);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -17,7 +17,7 @@
 #include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_check.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The predictions of the references and their mirror images for one site.
@@ -335,4 +335,4 @@ std::string FormatComparison(const ProposalComparison& comparison) {
                             comparison.most_mm);
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "problems/subject/landmarks.h"
 #include "surfaces/base/run_context.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ProposedSite {
   std::string site;
@@ -76,4 +76,4 @@ ProposalComparison CompareProposal(const LandmarkFile& proposal, const LandmarkF
 // A text for people: a line per site, then a summary.
 std::string FormatComparison(const ProposalComparison& comparison);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -22,7 +22,7 @@
 #include "surfaces/mesh/tri_mesh.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // A connected part of a mesh.
@@ -201,4 +201,4 @@ ReferenceHead Mirrored(const ReferenceHead& head) {
           .site_error_mm = head.site_error_mm};
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

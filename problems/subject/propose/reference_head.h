@@ -13,7 +13,7 @@
 #include "surfaces/mesh/correspondences.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 struct ShellPoint {
   Vec3 position = Vec3::Constant(kNaN);  // mm
@@ -60,4 +60,4 @@ ReferenceHead PhantomReference(std::uint64_t random_seed);
 // The mirror image of a head. Left and right sites exchange their names.
 ReferenceHead Mirrored(const ReferenceHead& head);
 
-}  // namespace semblance
+}  // namespace semblance::problems

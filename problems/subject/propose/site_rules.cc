@@ -13,7 +13,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // +x is left, +y back, +z up. A rule without direction leaves the site to the references, because
@@ -142,4 +142,4 @@ SnappedSite SnapToBone(std::string_view site, const Vec3& predicted, const Skull
   return snapped;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "problems/subject/propose/reference_head.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Chooses the point p of bone that maximises d . direction - |d|^2 / (2 reach), where d is p minus
 // the predicted point. On a plane tilted by an angle a, the site moves by reach * tan(a); a ridge
@@ -40,4 +40,4 @@ struct SnappedSite {
 SnappedSite SnapToBone(std::string_view site, const Vec3& predicted, const SkullShell& skull,
                        const Mat3& skull_from_average);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr double kMaxDistance_mm = 15;  // a larger distance carries no more information
@@ -296,4 +296,4 @@ std::string PoseFault(const SkullPose& pose) {
   return "";
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "problems/subject/propose/reference_head.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // A point of the moved reference and the corresponding point of the skull. All NaN if none
 // corresponds.
@@ -56,4 +56,4 @@ Similarity RefinePose(const SkullShell& reference, const SkullShell& skull,
 // The fault of an unclear pose and its remedy; empty if the pose is clear.
 std::string PoseFault(const SkullPose& pose);
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include "problems/subject/propose/skull_pose.h"
 #include "surfaces/mesh/tri_mesh.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr double kMinCosine = 0.5;  // normals within 60 degrees face alike
@@ -209,4 +209,4 @@ std::vector<WarpedSite> CarrySites(const ReferenceHead& reference, const SkullSh
   return sites;
 }
 
-}  // namespace semblance
+}  // namespace semblance::problems

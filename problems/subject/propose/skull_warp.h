@@ -8,7 +8,7 @@
 #include "problems/subject/propose/reference_head.h"
 #include "surfaces/base/thin_plate.h"
 
-namespace semblance {
+namespace semblance::problems {
 
 // Refines the pose by the bone within 30 mm of a site, because face and vault differ in size
 // independently.
@@ -37,4 +37,4 @@ struct WarpedSite {
 std::vector<WarpedSite> CarrySites(const ReferenceHead& reference, const SkullShell& skull,
                                    const Similarity& skull_from_reference, const ThinPlate& plate);
 
-}  // namespace semblance
+}  // namespace semblance::problems

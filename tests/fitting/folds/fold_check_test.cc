@@ -13,7 +13,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 constexpr double kNone = 0.01;
@@ -206,4 +206,4 @@ TEST(FoldCheck, ARollDiffersFromNoiseAsWideAsItsSpacing) {
 TEST(FoldCheck, AFewPointsShowNoFaults) { EXPECT_EQ(FromAbove(OnSphere, 20).Faults().Sum(), 0); }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -12,7 +12,7 @@
 #include "tests/testing/shapes.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::PlainStencil;
@@ -231,4 +231,4 @@ TEST(BendingMetric, MetricBeyondContinuesByTheSameStretch) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

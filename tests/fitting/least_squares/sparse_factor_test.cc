@@ -11,7 +11,7 @@
 #include "fitting/least_squares/sparse_factor.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // Rows of four consecutive entries each, like those of points on a curve.
@@ -185,4 +185,4 @@ TEST(SelectedInverse, OtherEntriesAreRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

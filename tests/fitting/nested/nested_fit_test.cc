@@ -16,7 +16,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::ErrorAgainst;
@@ -489,4 +489,4 @@ TEST(NestedFit, OffsetsAlongTheAxesOfTheWorldGiveTheSameSurface) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -15,7 +15,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::HeadPoint;
@@ -398,4 +398,4 @@ TEST(NestedSolve, TheTraceIsTheNumberOfVerticesWithoutSmoothness) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -10,7 +10,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::HeadPoint;
@@ -88,4 +88,4 @@ TEST_F(Search, FinalSolveUsesTheGivenWeight) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using ::testing::HasSubstr;
@@ -129,4 +129,4 @@ TEST(MeshMap, AHandleIsCounted) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -14,7 +14,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using ::testing::HasSubstr;
@@ -275,4 +275,4 @@ TEST(Parametrise, WrongInputIsNamed) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

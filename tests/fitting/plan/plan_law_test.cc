@@ -10,7 +10,7 @@
 #include "tests/testing/level_views.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::AllTerms;
@@ -154,4 +154,4 @@ TEST(PlanLaws, TheAdaptivePlanWeighsATermAsALevelDoes) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -11,7 +11,7 @@
 #include "tests/testing/shapes.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using ::testing::HasSubstr;
@@ -155,4 +155,4 @@ TEST(Placement, ErrorsNameTheRemedy) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using ::testing::HasSubstr;
@@ -172,4 +172,4 @@ TEST(Seeding, WrongInputIsNamed) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

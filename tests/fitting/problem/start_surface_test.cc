@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 struct Points {
@@ -69,4 +69,4 @@ TEST(StartSurface, NeedsUvForEachPoint) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -16,7 +16,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::FrankePoint;
@@ -178,4 +178,4 @@ TEST(FootMoves, WithoutRoundsAndOfOtherFitsNothingMoves) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

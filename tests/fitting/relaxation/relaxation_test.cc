@@ -19,7 +19,7 @@
 #include "surfaces/hspline_query/hspline_project.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::SmoothSurface;
@@ -364,4 +364,4 @@ TEST(Relaxation, IsReportedByStep) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -13,7 +13,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/scattered_data.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 struct Coloured {
@@ -124,4 +124,4 @@ TEST(AttributeFit, WrongColumnsAreRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scattered_data.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::ErrorAgainst;
@@ -160,4 +160,4 @@ TEST(AutoWeight, ALossThatMeetsNoOutlierIsSolvedOnce) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -11,7 +11,7 @@
 #include "tests/testing/level_views.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::AllTerms;
@@ -128,4 +128,4 @@ TEST(CoupledSolver, FindsWhatCeresFinds) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

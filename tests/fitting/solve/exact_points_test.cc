@@ -16,7 +16,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::FrankePoint;
@@ -198,4 +198,4 @@ TEST(ExactPoints, ContradictionsAreRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

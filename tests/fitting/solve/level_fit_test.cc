@@ -15,7 +15,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/level_views.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::AllTerms;
@@ -381,4 +381,4 @@ TEST(ScheduleStep, WrongInputIsNamed) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -13,7 +13,7 @@
 #include "tests/testing/drawn_part.h"
 #include "tests/testing/scattered_data.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 const HSplineShape kShape = {.patches_u = 8, .patches_v = 8, .max_level = 4};
@@ -140,4 +140,4 @@ TEST(Gap, WithHardlyAnySmoothnessTheSurfaceDiverges) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -18,7 +18,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::CleanError;
@@ -548,4 +548,4 @@ TEST(Reweighting, PointsWithoutPullLeaveTheSurfaceToOtherTerms) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -17,7 +17,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/scattered_data.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::FrankePoint;
@@ -208,4 +208,4 @@ TEST(SurfaceSigma, IsLargeWhereNothingIsDetermined) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -9,7 +9,7 @@
 #include "fitting/problem/placement.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::RandomSurface;
@@ -68,4 +68,4 @@ TEST(MetricDistortion, AreaIsTheIntegralOfTheJacobian) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

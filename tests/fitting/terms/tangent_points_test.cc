@@ -13,7 +13,7 @@
 #include "tests/testing/level_views.h"
 #include "tests/testing/scattered_data.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 // J^T J and J^T r over all coordinates of the dofs.
@@ -117,4 +117,4 @@ TEST(TangentSums, OfAllLevelsEqualThoseOfTheirRows) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -13,7 +13,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/level_views.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using testing::AllTerms;
@@ -342,4 +342,4 @@ TEST(Terms, BoneTermsNeedFeet) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

@@ -14,7 +14,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::fitting {
 namespace {
 
 using ::testing::ElementsAre;
@@ -349,4 +349,4 @@ TEST(PivotedRoot, ReproducesTheMatrixToItsShare) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::fitting

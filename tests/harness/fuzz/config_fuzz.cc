@@ -13,13 +13,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using semblance::testing::Options;
   try {
     const std::string_view text(reinterpret_cast<const char*>(data), size);
-    const auto read = semblance::ReadConfigText<Options>(text, "/nowhere/fuzz.yaml");
-    const std::string written = semblance::WriteConfig(read);
-    const auto again = semblance::ReadConfigText<Options>(written, "/nowhere/fuzz.yaml");
-    if (semblance::WriteConfig(again) != written) {
+    const auto read = semblance::problems::ReadConfigText<Options>(text, "/nowhere/fuzz.yaml");
+    const std::string written = semblance::problems::WriteConfig(read);
+    const auto again = semblance::problems::ReadConfigText<Options>(written, "/nowhere/fuzz.yaml");
+    if (semblance::problems::WriteConfig(again) != written) {
       std::abort();
     }
-  } catch (const semblance::Error&) {
+  } catch (const semblance::problems::Error&) {
   }
   return 0;
 }

@@ -18,8 +18,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   try {
     const std::string path = "/proc/self/fd/" + std::to_string(file);
-    semblance::CheckVolume(semblance::ReadInvesalius(path), "fuzz");
-  } catch (const semblance::Error&) {
+    semblance::problems::CheckVolume(semblance::problems::ReadInvesalius(path), "fuzz");
+  } catch (const semblance::problems::Error&) {
   }
   return 0;
 }

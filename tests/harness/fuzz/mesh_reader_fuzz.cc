@@ -14,16 +14,16 @@
 
 namespace {
 
-using semblance::TriMesh;
+using semblance::surfaces::TriMesh;
 
 TriMesh Read(std::string_view bytes) {
   const char first = bytes.empty() ? 'p' : bytes.front();
   if (first == 'p') {
-    const TriMesh mesh = semblance::ReadPly(bytes, "fuzz.ply");
-    if (semblance::PlyVertexScalar(bytes, "x", "fuzz.ply").size() != mesh.points.size()) {
+    const TriMesh mesh = semblance::surfaces::ReadPly(bytes, "fuzz.ply");
+    if (semblance::surfaces::PlyVertexScalar(bytes, "x", "fuzz.ply").size() != mesh.points.size()) {
       std::abort();
     }
-    const semblance::MeshAttributes more = semblance::ReadPlyAttributes(bytes, "fuzz.ply");
+    const semblance::surfaces::MeshAttributes more = semblance::surfaces::ReadPlyAttributes(bytes, "fuzz.ply");
     for (const auto& scalar : more.scalars) {
       if (scalar.values.size() != mesh.points.size()) {
         std::abort();
@@ -32,20 +32,20 @@ TriMesh Read(std::string_view bytes) {
     return mesh;
   }
   if (first == 'O' || first == 'C' || first == 'N') {
-    return semblance::ReadOff(bytes, "fuzz.off");
+    return semblance::surfaces::ReadOff(bytes, "fuzz.off");
   }
   const bool printable = first >= ' ' && first <= '~';
-  return first == 's' || !printable ? semblance::ReadStl(bytes, "fuzz.stl")
-                                    : semblance::ReadObj(bytes, "fuzz.obj");
+  return first == 's' || !printable ? semblance::surfaces::ReadStl(bytes, "fuzz.stl")
+                                    : semblance::surfaces::ReadObj(bytes, "fuzz.obj");
 }
 
 void AbortUnlessValid(const TriMesh& mesh) {
-  for (const semblance::Vec3& p : mesh.points) {
+  for (const semblance::surfaces::Vec3& p : mesh.points) {
     if (!p.allFinite()) {
       std::abort();
     }
   }
-  for (const semblance::Triangle& t : mesh.triangles) {
+  for (const semblance::surfaces::Triangle& t : mesh.triangles) {
     for (const std::int32_t v : t) {
       if (v < 0 || static_cast<std::size_t>(v) >= mesh.points.size()) {
         std::abort();
@@ -59,7 +59,7 @@ void AbortUnlessValid(const TriMesh& mesh) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   try {
     AbortUnlessValid(Read({reinterpret_cast<const char*>(data), size}));
-  } catch (const semblance::InputError&) {
+  } catch (const semblance::surfaces::InputError&) {
   }
   return 0;
 }

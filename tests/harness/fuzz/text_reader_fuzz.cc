@@ -21,7 +21,7 @@
 
 namespace {
 
-using semblance::LandmarkFile;
+using semblance::problems::LandmarkFile;
 
 void Require(bool condition) {
   if (!condition) {
@@ -30,15 +30,15 @@ void Require(bool condition) {
 }
 
 void ReadPoints(std::string_view bytes) {
-  const semblance::PointTable table = semblance::ParsePointTable(bytes, "fuzz");
+  const semblance::problems::PointTable table = semblance::problems::ParsePointTable(bytes, "fuzz");
   Require(!table.positions.empty());
-  for (const semblance::Vec3& p : table.positions) {
+  for (const semblance::problems::Vec3& p : table.positions) {
     Require(p.allFinite());
   }
 }
 
 void ReadArray(std::string_view bytes) {
-  const semblance::NpyArray array = semblance::ParseNpy(bytes, "fuzz");
+  const semblance::problems::NpyArray array = semblance::problems::ParseNpy(bytes, "fuzz");
   std::size_t count = 1;
   for (const std::size_t n : array.shape) {
     count *= n;
@@ -47,13 +47,13 @@ void ReadArray(std::string_view bytes) {
 }
 
 void ReadSurface(std::string_view bytes) {
-  const semblance::HSplineSurface surface = semblance::HSplineFromJson(bytes, "fuzz");
-  const std::string text = semblance::HSplineToJson(surface);
-  Require(semblance::HSplineToJson(semblance::HSplineFromJson(text, "fuzz")) == text);
+  const semblance::problems::HSplineSurface surface = semblance::problems::HSplineFromJson(bytes, "fuzz");
+  const std::string text = semblance::problems::HSplineToJson(surface);
+  Require(semblance::problems::HSplineToJson(semblance::problems::HSplineFromJson(text, "fuzz")) == text);
 }
 
 void CheckFinite(const LandmarkFile& file) {
-  for (const semblance::Landmark& landmark : file.landmarks) {
+  for (const semblance::problems::Landmark& landmark : file.landmarks) {
     for (const double x : landmark.point) {
       Require(std::isfinite(x));
     }
@@ -62,12 +62,12 @@ void CheckFinite(const LandmarkFile& file) {
 
 void ReadTable(std::string_view bytes) {
   std::vector<std::string> ignored;
-  CheckFinite(semblance::ParseLandmarkTable(bytes, "fuzz", ignored));
+  CheckFinite(semblance::problems::ParseLandmarkTable(bytes, "fuzz", ignored));
 }
 
 void ReadCondition(std::string_view bytes) {
   const std::vector<std::string> names = {"subject", "interp", "implicit.resolution"};
-  const semblance::ValueFilter filter(bytes, names);
+  const semblance::problems::ValueFilter filter(bytes, names);
   filter.Holds({{"subject", "a"}, {"interp", "kriging"}, {"implicit.resolution", "40"}});
 }
 
@@ -80,13 +80,13 @@ void Read(char kind, std::string_view bytes) {
     case 'h':
       return ReadSurface(bytes);
     case 'f':
-      return CheckFinite(semblance::ParseFcsv(bytes, "fuzz"));
+      return CheckFinite(semblance::problems::ParseFcsv(bytes, "fuzz"));
     case 'm':
-      return CheckFinite(semblance::ParseMarkupsJson(bytes, "fuzz"));
+      return CheckFinite(semblance::problems::ParseMarkupsJson(bytes, "fuzz"));
     case 'p':
-      return CheckFinite(semblance::ParseMeshLabPoints(bytes, "fuzz"));
+      return CheckFinite(semblance::problems::ParseMeshLabPoints(bytes, "fuzz"));
     case 't':
-      return CheckFinite(semblance::ParsePointList(bytes, "fuzz"));
+      return CheckFinite(semblance::problems::ParsePointList(bytes, "fuzz"));
     case 'l':
       return ReadTable(bytes);
     default:
@@ -102,7 +102,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   try {
     Read(static_cast<char>(data[0]), {reinterpret_cast<const char*>(data) + 1, size - 1});
-  } catch (const semblance::Error&) {
+  } catch (const semblance::problems::Error&) {
   }
   return 0;
 }

@@ -86,8 +86,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string bytes(reinterpret_cast<const char*>(data) + 1, size - 1);
   try {
     const fs::path path = WriteInput(scratch, static_cast<char>(data[0]), bytes);
-    semblance::CheckVolume(semblance::ReadVolume(path, {}, {}).volume, "fuzz");
-  } catch (const semblance::Error&) {
+    semblance::problems::CheckVolume(semblance::problems::ReadVolume(path, {}, {}).volume, "fuzz");
+  } catch (const semblance::problems::Error&) {
   }
   return 0;
 }

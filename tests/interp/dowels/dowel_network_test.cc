@@ -10,7 +10,7 @@
 #include "interp/schemes/network_schemes.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::DomeScene;
@@ -154,4 +154,4 @@ TEST(LeftOutDowels, TheNearestIsTheNearestOfThoseShown) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

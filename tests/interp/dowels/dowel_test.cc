@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 TEST(SiteCode, EndsInItsSide) {
@@ -21,4 +21,4 @@ TEST(SiteCode, ASuffixAloneIsNoSide) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 // Each left out alone.
@@ -281,4 +281,4 @@ TEST(CrossValidation, ReportsAFaultyFold) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -6,7 +6,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::DomeScene;
@@ -95,4 +95,4 @@ TEST(DepthDirections, OfDowelsAreTheirsAtBasesTheirMeanBetweenAndTheMeshsOutside
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -8,7 +8,7 @@
 #include "tests/testing/dowel_scenes.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using ::testing::Each;
@@ -88,4 +88,4 @@ TEST(DepthTruth, NeedsOneDirectionPerVertex) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -13,7 +13,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using ::testing::Each;
@@ -226,4 +226,4 @@ TEST(Coverage, OfNothingIsNothing) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -7,7 +7,7 @@
 
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 // Two places of two values each: within a place half of 2^2, between them half the mean of
@@ -115,4 +115,4 @@ TEST(Variogram, FitRefusesWhatCannotBeFitted) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -11,7 +11,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::DowelScene;
@@ -376,4 +376,4 @@ TEST(Kriging, TheCovarianceIsTheEffectOfAnotherDowel) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

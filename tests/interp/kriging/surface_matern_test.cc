@@ -17,7 +17,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Count;
@@ -405,4 +405,4 @@ TEST_P(EveryMean, DepthsThatFollowThePlaceInTheHeadDoSoEverywhere) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Plate;
@@ -85,4 +85,4 @@ TEST(BoneGeometry, IsTheDepthBelowTheHullWhereItFacesAndHowFarAnOrbitIs) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 #include "interp/on_surface/bone_geometry.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Joined;
@@ -103,4 +103,4 @@ TEST(BoneRelief, IsAboveZeroInAHollow) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -11,7 +11,7 @@
 
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Joined;
@@ -243,4 +243,4 @@ TEST_P(EveryAlpha, DerivativeOfReducedCorrelationsEqualsItsNumericTwin) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

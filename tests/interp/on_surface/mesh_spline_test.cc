@@ -14,7 +14,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Count;
@@ -266,4 +266,4 @@ TEST(MeshSplines, ReportThatTheyNeedTriangles) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

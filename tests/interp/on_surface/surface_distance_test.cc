@@ -13,7 +13,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Count;
@@ -168,4 +168,4 @@ TEST(GeodesicSchemes, ReportThatTheyNeedTriangles) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

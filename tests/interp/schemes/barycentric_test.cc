@@ -10,7 +10,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Count;
@@ -362,4 +362,4 @@ TEST(Barycentric, NeedsAnArea) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -12,7 +12,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Count;
@@ -174,4 +174,4 @@ TEST_F(DepthMapTest, ReadsPlyNumbersOfEveryTypeAndOrder) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

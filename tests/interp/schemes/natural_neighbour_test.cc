@@ -11,7 +11,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::DowelScene;
@@ -160,4 +160,4 @@ TEST(NaturalNeighbour, SibsonsWeightsAreStolenAreas) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::DomeScene;
@@ -158,4 +158,4 @@ TEST(NetworkSpline, NeedsAnArea) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

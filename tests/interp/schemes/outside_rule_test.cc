@@ -10,7 +10,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::DomeScene;
@@ -188,4 +188,4 @@ TEST(OutsideRule, RefusesTheFieldOfAnotherSkull) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -9,7 +9,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 // Sites around the origin, some of them above its plane.
@@ -113,4 +113,4 @@ TEST(PowerCell, SitesOnOneCircleShareAlike) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -8,7 +8,7 @@
 #include "interp/interpolate_depth.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Count;
@@ -175,4 +175,4 @@ TEST(MovingLeastSquares, IsTheNearestDowelFarAwayAndTheMeanWithAGreatWidth) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -10,7 +10,7 @@
 #include "interp/interpolate_depth.h"
 #include "tests/testing/dowel_scenes.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 using testing::Count;
@@ -146,4 +146,4 @@ TEST(AutoScheme, StatesAnSdThatHolds) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

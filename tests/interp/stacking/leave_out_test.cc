@@ -8,7 +8,7 @@
 
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 // Errors that follow the law give back its scale.
@@ -42,4 +42,4 @@ TEST(SdByDistance, OfFewerThanThreeErrorsIsNone) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

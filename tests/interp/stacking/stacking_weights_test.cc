@@ -7,7 +7,7 @@
 
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::interp {
 namespace {
 
 Eigen::VectorXd Alike(const Eigen::MatrixXd& errors) {
@@ -104,4 +104,4 @@ TEST(StackedErrors, UseWeightsFromTheOtherPoints) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::interp

@@ -24,7 +24,7 @@
 #include "tests/testing/program_call.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -470,4 +470,4 @@ TEST_F(CommandLine, AKilledRunLeavesNoFileAndTheNextOneCleansUp) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 CommandNode NamedCommand(const std::string& name) {
@@ -71,4 +71,4 @@ TEST(CommandTree, HasTheAllowedWordsOfAnOption) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -18,7 +18,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -70,7 +70,7 @@ class EvaluateFace : public ::testing::Test {
 
 TEST_F(EvaluateFace, GivesTheNumbersOfTheRun) {
   const auto experiment = ReadConfig<Experiment>(folder_ / "e.yaml");
-  const RunResult run = semblance::Run(experiment, {});
+  const RunResult run = problems::Run(experiment, {});
   WriteHSpline(folder_ / "face.hspline.json", run.fit.surface);
   const auto expected = ResultJson(experiment, run).at("face");
   const auto by_config = nlohmann::ordered_json::parse(Evaluate(OptionsOfRun(), {}).dump());
@@ -108,4 +108,4 @@ TEST(ParseZone, ReadsASiteAndARadius) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

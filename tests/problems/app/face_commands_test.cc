@@ -15,7 +15,7 @@
 #include "tests/testing/program_call.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -200,4 +200,4 @@ TEST_F(FaceCommands, FeatureRefusesWhatItCannotDo) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

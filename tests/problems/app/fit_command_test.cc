@@ -26,7 +26,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -502,4 +502,4 @@ TEST_F(FitCommand, TheRmsIsThatOfTheDistances) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

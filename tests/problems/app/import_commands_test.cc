@@ -9,7 +9,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/program_call.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -97,4 +97,4 @@ TEST_F(ImportCommands, ASubjectMayBeAFolderOfDicom) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

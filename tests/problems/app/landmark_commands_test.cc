@@ -8,7 +8,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/program_call.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -97,4 +97,4 @@ TEST_F(LandmarkCommands, AProposalOnARasSkullIsTurnedIfTheFileCannotStateRas) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

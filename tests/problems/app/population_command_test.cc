@@ -7,7 +7,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/program_call.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -112,4 +112,4 @@ TEST_F(PopulationCommand, RefusesToGatherFromAMissingFolder) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

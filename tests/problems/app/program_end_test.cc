@@ -19,7 +19,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -135,4 +135,4 @@ TEST(StopSignals, WorkThatIgnoresTheStopIsEndedAfterASecond) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

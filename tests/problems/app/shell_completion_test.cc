@@ -14,7 +14,7 @@
 
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 CommandNode Sample() {
@@ -143,4 +143,4 @@ TEST(ManualPage, HasEachCommandWithItsOptions) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

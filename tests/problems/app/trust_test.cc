@@ -22,7 +22,7 @@
 #include "tests/testing/program_call.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -435,4 +435,4 @@ TEST_F(Trust, ImportRefusesMeshesThatARunWouldRefuse) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

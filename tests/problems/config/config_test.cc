@@ -20,7 +20,7 @@
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -639,4 +639,4 @@ TEST(OptionsSchema, IsJsonAndHasEveryPathOfTheReference) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

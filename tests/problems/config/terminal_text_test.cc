@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <string>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 TEST(TerminalText, KeepsLinesAndLettersAndReplacesControlCharacters) {
@@ -34,4 +34,4 @@ TEST(TerminalText, QuotedTextComesBackFromAShell) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -85,4 +85,4 @@ TEST(ValueFilter, ReportsThePlaceOfAFault) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

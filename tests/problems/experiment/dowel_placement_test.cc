@@ -6,7 +6,7 @@
 
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -90,4 +90,4 @@ TEST_F(ShellDowelsTest, NothingIsPressedInWhereDowelsReachOutOrPressingIsOff) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

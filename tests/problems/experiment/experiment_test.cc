@@ -14,7 +14,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -309,4 +309,4 @@ TEST(Experiment, TheLevelsOfATemplateFromFilesAreThoseOfItsSurface) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "problems/subject/phantom.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::Contains;
@@ -150,7 +150,7 @@ TEST(ExtraDowels, SitesThatCannotBePlacedAreNamedInOneLine) {
 TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeld) {
   const std::vector<std::string> quick = {"seeds.level=1"};
   const auto uv_of = [&](const std::string& sites) {
-    const RunResult result = semblance::Run(Phantom30(sites, quick), {});
+    const RunResult result = problems::Run(Phantom30(sites, quick), {});
     for (std::size_t k = 0; k < result.target.points.size(); ++k) {
       if (result.target.points[k].label == "go_l") {
         return result.fit.uv[k];
@@ -163,4 +163,4 @@ TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeld) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::Contains;
@@ -170,4 +170,4 @@ TEST_F(InputCheckTest, AnUnusedTableIsNoInput) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::Contains;
@@ -28,9 +28,9 @@ TEST(HandEdits, ARunReplaysItsScriptAndNotesIt) {
   const testing::ScratchFolder folder;
   WriteFileAtomically(folder / "mine.yaml", "edits: [{level: 2, i: 9, j: 9, offset: [0, 0, 6]}]\n");
   StageCache cache(8);
-  const RunResult plain = semblance::Run(PlacedPhantom({}), {}, &cache);
+  const RunResult plain = problems::Run(PlacedPhantom({}), {}, &cache);
   const RunResult edited =
-      semblance::Run(PlacedPhantom({"edits=" + (folder / "mine.yaml").string()}), {}, &cache);
+      problems::Run(PlacedPhantom({"edits=" + (folder / "mine.yaml").string()}), {}, &cache);
   HSplineSurface wanted = plain.fit.surface;
   ApplyEdits(ReadEditScript(folder / "mine.yaml"), wanted);
   EXPECT_EQ(edited.fit.surface.Offsets(), wanted.Offsets());
@@ -76,4 +76,4 @@ TEST(RelaxationWorth, ItUndoesWrongParametersWithoutACreaseAndWithoutItTheyStay)
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

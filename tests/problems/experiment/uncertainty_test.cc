@@ -12,7 +12,7 @@
 #include "problems/run.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 const std::string kPhantom = SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml";
@@ -20,7 +20,7 @@ const std::string kPhantom = SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml";
 RunResult RunPhantom(std::vector<std::string> overrides) {
   static StageCache cache(8);  // the tests share their phantoms
   overrides.insert(overrides.begin(), {"subject.rings=36", "implicit.resolution=44"});
-  return semblance::Run(ReadConfig<Experiment>(kPhantom, overrides), {}, &cache);
+  return problems::Run(ReadConfig<Experiment>(kPhantom, overrides), {}, &cache);
 }
 
 double MedianSigma(const RunResult& result) { return result.uncertainty->median_mm; }
@@ -100,4 +100,4 @@ TEST(Uncertainty, CoverageIsMeasuredByPart) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -120,4 +120,4 @@ TEST(EditScript, ARepeatedVertexIsRefusedWhenTheFileIsRead) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -23,7 +23,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -478,4 +478,4 @@ TEST(PriorTarget, TableDepthsAreLessSureAlongTheDowel) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -226,4 +226,4 @@ TEST(FeatureRules, AnUnknownPointIsAFault) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

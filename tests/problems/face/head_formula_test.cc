@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kSteps = 240;
@@ -166,4 +166,4 @@ TEST(HeadFormula, HasNoKinkAcrossTheMidlineNorAlongIt) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

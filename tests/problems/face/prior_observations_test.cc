@@ -9,7 +9,7 @@
 #include "problems/subject/sites.h"
 #include "problems/subject/tissue_table.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 Dowel DowelAt(const std::string& site, double depth_mm) {
@@ -78,4 +78,4 @@ TEST(SeedTrust, SeedsWithoutTrustAreDropped) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

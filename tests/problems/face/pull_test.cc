@@ -9,7 +9,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::RandomSurface;
@@ -101,4 +101,4 @@ TEST(Pull, WhatCannotBeIsRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

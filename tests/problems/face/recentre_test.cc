@@ -8,7 +8,7 @@
 #include "problems/face/template_source.h"
 #include "problems/face/hspline_prior.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr double kMovedMm = 1.5;
@@ -82,4 +82,4 @@ TEST(Recentre, ATipWithoutSkinDoesNotMoveItsSite) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

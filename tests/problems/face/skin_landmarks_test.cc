@@ -13,7 +13,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -134,4 +134,4 @@ TEST(FacialLandmarks, StandWhereTheirNamesSay) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

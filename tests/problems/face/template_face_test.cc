@@ -13,7 +13,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -226,4 +226,4 @@ TEST(TemplateFace, OptionsOutOfRangeAreNamed) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

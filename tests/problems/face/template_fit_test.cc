@@ -22,7 +22,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -259,4 +259,4 @@ TEST(TemplateFit, AModelHeadOfOtherTopologyIsMet) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -207,4 +207,4 @@ TEST_F(TemplateIo, RefusesToWriteWhatItWouldNotRead) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -150,4 +150,4 @@ TEST(ImplicitCache, DamagedBytesAreNoFace) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 TEST(FileHashes, FollowChangesOfTheFile) {
@@ -43,4 +43,4 @@ TEST(FileHashes, AreReusedIfSizeAndTimeAreEqual) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

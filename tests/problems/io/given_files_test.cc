@@ -13,7 +13,7 @@
 #include "surfaces/base/encoding.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -102,4 +102,4 @@ TEST_F(GivenFilesTest, PublishingRemovesOldFiles) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -178,4 +178,4 @@ TEST_F(OutputFolderTest, NamesMustStayInsideTheFolder) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -213,4 +213,4 @@ TEST(StagedFolder, AFileWithTheNameOfTheFolderIsNotChanged) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "surfaces/base/quantile.h"
 #include "tests/testing/scattered_data.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -119,4 +119,4 @@ TEST(FitPage, ReportsAMissedToleranceAndEscapesText) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

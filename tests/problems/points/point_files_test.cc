@@ -19,7 +19,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -315,4 +315,4 @@ TEST_F(PointFiles, ContentsOfAnotherFormatAreRefusedByName) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

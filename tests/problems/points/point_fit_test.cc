@@ -25,7 +25,7 @@
 #include "tests/testing/scattered_data.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::ErrorAgainst;
@@ -332,4 +332,4 @@ TEST(PointFit, ConfigurationRoundTrips) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

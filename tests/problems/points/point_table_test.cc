@@ -7,7 +7,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -106,4 +106,4 @@ TEST(PointTable, FaultsAreNamedWithTheirLine) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -7,7 +7,7 @@
 
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 constexpr int kSide = 8, kCells = kSide * kSide;
@@ -84,4 +84,4 @@ TEST(FindModes, LeavesOutCellsThatFewHaveAndNeedsTwoPeople) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // People of a known distribution, whose body mass index is correlated with their mean depth.
@@ -123,4 +123,4 @@ TEST(LeaveOneOut, ScoresAPublishedTableToo) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -10,7 +10,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::IsEmpty;
@@ -64,4 +64,4 @@ TEST(FindOutliers, SkipsSitesOfFewSubjects) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -25,7 +25,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -449,4 +449,4 @@ TEST(ReadPopulation, IdsFollowTheContentAndNotTheFolderOrThePerson) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

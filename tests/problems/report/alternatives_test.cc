@@ -18,7 +18,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -135,7 +135,7 @@ TEST(Alternatives, LieBelowTheRunAndListLeftOutSites) {
   const testing::ScratchFolder scratch;
   OutputFolder folder(scratch / "out", WhenNotEmpty::kRefuse);
   StageCache cache(16);
-  RunResult own = semblance::Run(experiment, {}, &cache);
+  RunResult own = problems::Run(experiment, {}, &cache);
   own.implicit.notes = {"of the implicit face"};
   EXPECT_THAT(
       RunAlternatives(experiment, MakeAlternatives(experiment, kConfigs, {}), own, cache, folder, {}),
@@ -161,7 +161,7 @@ TEST(Alternatives, SitesWithoutADepthInTheRunsTableAreLeftOut) {
   const testing::ScratchFolder scratch;
   OutputFolder folder(scratch / "out", WhenNotEmpty::kRefuse);
   StageCache cache(16);
-  const RunResult own = semblance::Run(experiment, {}, &cache);
+  const RunResult own = problems::Run(experiment, {}, &cache);
   RunAlternatives(experiment, MakeAlternatives(experiment, kConfigs, {}), own, cache, folder, {});
   const auto json = nlohmann::json::parse(ReadFileBytes(scratch / "out/alternatives.json"));
   EXPECT_THAT(json[0]["left_out"], Contains("iM2_l"));
@@ -173,7 +173,7 @@ TEST(Alternatives, OfAnEarlierRunInTheFolderAreIgnored) {
   const testing::ScratchFolder scratch;
   const Experiment experiment = SmallPhantom({"face=placed"});
   OutputFolder folder(scratch / "out", WhenNotEmpty::kRefuse);
-  WriteRun(experiment, semblance::Run(experiment, {}), folder, {});
+  WriteRun(experiment, problems::Run(experiment, {}), folder, {});
   folder.Write("alternatives.json", "[]");  // left by an earlier run
   WriteReport(folder);
   EXPECT_THAT(ReadFileBytes(scratch / "out/report.html"),
@@ -181,4 +181,4 @@ TEST(Alternatives, OfAnEarlierRunInTheFolderAreIgnored) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -23,7 +23,7 @@
 #include "tests/testing/shapes.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -45,7 +45,7 @@ class ExportFile : public ::testing::Test {
     const auto experiment =
         ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides);
     OutputFolder folder(scratch_ / "run", WhenNotEmpty::kRefuse);
-    WriteRun(experiment, semblance::Run(experiment, {}), folder, {});
+    WriteRun(experiment, problems::Run(experiment, {}), folder, {});
     return folder.Root();
   }
 
@@ -156,4 +156,4 @@ TEST_F(ExportFile, InvalidCombinationsAreRefusedWithARemedy) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

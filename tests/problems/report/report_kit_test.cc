@@ -13,7 +13,7 @@
 #include "problems/report/report_assets.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -228,4 +228,4 @@ TEST(PlainNames, OneIsSingular) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::ScratchFolder;
@@ -223,4 +223,4 @@ TEST_F(ReportViewTest, FitsAPhoneAndFindsWhatIsFolded) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

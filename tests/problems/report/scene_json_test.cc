@@ -13,7 +13,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -122,4 +122,4 @@ TEST(CollectScenes, RefusesAnInvalidScene) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -72,4 +72,4 @@ TEST(SitePage, EveryRowOfTheTablesIsASiteOfThePage) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -276,4 +276,4 @@ TEST(DepthStudy, ReportsAnUnknownJob) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -111,4 +111,4 @@ TEST_F(IdentifyStudy, SameBytesForAnyJobs) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

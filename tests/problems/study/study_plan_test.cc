@@ -15,7 +15,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -238,4 +238,4 @@ TEST_F(StudyPlanTest, EachTypeOfAnAxisHasItsOwnDefaults) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

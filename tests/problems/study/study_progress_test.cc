@@ -9,7 +9,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -50,4 +50,4 @@ TEST(StudyProgress, WithoutATerminalPrintsFailuresAndTheEnd) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

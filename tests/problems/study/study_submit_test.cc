@@ -13,7 +13,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -139,4 +139,4 @@ TEST_F(SlurmTest, ALostNodeChangesNoByteOfTheMergedTable) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -16,7 +16,7 @@
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/study_files.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -201,7 +201,7 @@ TEST_F(StudyTest, ResultsEqualThoseOfSingleRuns) {
   RunStudy(plan, folder_ / "run", {.jobs = 2}, {});
   const StudyResults results = ReadStudyResults(folder_ / "run");
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
-    const RunResult alone = semblance::Run(plan.trials[n].experiment, {});
+    const RunResult alone = problems::Run(plan.trials[n].experiment, {});
     EXPECT_EQ(results.trials[n].metrics.at("face.rms_mm"), alone.truth->face.truth_to_face.rms_mm);
   }
 }
@@ -241,4 +241,4 @@ TEST(StageCache, MakesEachValueOnceAndDropsTheLeastRecentlyUsed) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

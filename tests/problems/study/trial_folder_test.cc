@@ -15,7 +15,7 @@
 #include "surfaces/base/json_text.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -173,4 +173,4 @@ TEST(TrialNumbers, AreMissingForATextThatIsNotATrial) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 const Similarity kPose = {
@@ -113,4 +113,4 @@ TEST(AverageSkull, RefusesTooFewAndALine) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

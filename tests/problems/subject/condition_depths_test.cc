@@ -16,7 +16,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 std::vector<std::string> AllSites() {
@@ -278,4 +278,4 @@ TEST(ConditionDepths, ReachesTheCase) {
 
 }  // namespace
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -218,4 +218,4 @@ TEST(FillDepths, NoDepthAtAllIsAnError) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

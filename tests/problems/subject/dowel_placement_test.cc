@@ -17,7 +17,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -262,4 +262,4 @@ TEST(PlaceDowels, RefusesToGuessADirection) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

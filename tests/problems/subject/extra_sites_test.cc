@@ -8,7 +8,7 @@
 #include "problems/subject/sites.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -93,4 +93,4 @@ TEST(PointNear, IsThePointTheLandmarkOrTheMiddleOfSeveral) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

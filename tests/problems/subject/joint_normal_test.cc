@@ -18,7 +18,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using Eigen::Index;
@@ -361,4 +361,4 @@ TEST(FitJointNormal, RefusesANumberThatDoesNotVary) {
 
 }  // namespace
 
-}  // namespace semblance
+}  // namespace semblance::problems

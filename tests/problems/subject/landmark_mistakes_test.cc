@@ -13,7 +13,7 @@
 #include "problems/subject/mandible.h"
 #include "problems/subject/phantom.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -275,4 +275,4 @@ TEST(LandmarkMistakes, AMissingMandibleIsReportedOnce) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -93,4 +93,4 @@ TEST(LandmarkFile, RefusesNothingNoPointAndNoUnitNormal) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // An average skull in another pose and size, with noise_mm of noise on its sites and an open jaw.
@@ -212,4 +212,4 @@ TEST(Hinge, UncheckedCondylesAreRefusedToo) {
 
 }  // namespace
 
-}  // namespace semblance
+}  // namespace semblance::problems

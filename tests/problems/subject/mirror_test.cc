@@ -14,7 +14,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::Contains;
@@ -191,4 +191,4 @@ TEST(OriginOfShell, BoneFarFromTheSkullIsInferred) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

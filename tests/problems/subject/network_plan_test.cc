@@ -14,7 +14,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -223,4 +223,4 @@ TEST(WithoutSites, NothingGoneKeepsThePlanAndUnknownSitesStay) {
 
 }  // namespace
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -79,4 +79,4 @@ TEST(PhantomCt, SpacingsAreChecked) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // The areas of the right side of the thesis's network, by the thesis's numbers of the sites.
@@ -396,4 +396,4 @@ TEST(PhantomRelief, TissueIsThickBesideTheTeethAndThinOverTheNasalBones) {
 
 }  // namespace
 
-}  // namespace semblance
+}  // namespace semblance::problems

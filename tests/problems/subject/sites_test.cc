@@ -8,7 +8,7 @@
 #include <map>
 #include <set>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -120,4 +120,4 @@ TEST(FindSiteByName, StatesTheFault) {
 
 }  // namespace
 
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -13,7 +13,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -235,4 +235,4 @@ TEST(TissueTable, RefusesAMissingFile) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

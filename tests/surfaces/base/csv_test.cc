@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::ElementsAre;
@@ -104,4 +104,4 @@ TEST(Csv, ALineAfterABreakInACellHasItsOwnNumber) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

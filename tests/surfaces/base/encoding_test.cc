@@ -6,7 +6,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 TEST(Base64, Rfc4648Examples) {
@@ -37,4 +37,4 @@ TEST(Base64, OtherTextIsRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -8,7 +8,7 @@
 
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::ElementsAre;
@@ -50,4 +50,4 @@ TEST(FarthestFirst, NoneTwiceWherePointsCoincide) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::HasSubstr;
@@ -70,4 +70,4 @@ TEST(JsonText, InvalidJsonIsReported) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::ElementsAre;
@@ -82,4 +82,4 @@ TEST(Npy, UnreadableFilesAreReported) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

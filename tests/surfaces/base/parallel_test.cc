@@ -11,7 +11,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 std::size_t SumOfIndices(int threads) {
@@ -65,4 +65,4 @@ TEST(ParallelFor, RethrowsTheExceptionOfTheLowestBlock) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

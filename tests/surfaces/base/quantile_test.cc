@@ -7,7 +7,7 @@
 #include <limits>
 #include <vector>
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 double Of(const std::vector<double>& values, double share) {
@@ -64,4 +64,4 @@ TEST(Quantile, TheUpperMedianIsOneOfTheValues) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -11,7 +11,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::HasSubstr;
@@ -163,4 +163,4 @@ TEST(ThinPlate, UnsolvableInputIsReportedInOneLine) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

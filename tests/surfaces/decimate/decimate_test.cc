@@ -11,7 +11,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::Joined;
@@ -380,4 +380,4 @@ TEST(Decimate, AMeshThatIsNoManifoldLosesNoTriangleAtItsFaults) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

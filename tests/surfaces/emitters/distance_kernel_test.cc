@@ -9,7 +9,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 struct Emitting {
@@ -85,4 +85,4 @@ TEST_P(DistanceKernelTest, EachLaneIsTheThesisAndTheSumIsTheLanes) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

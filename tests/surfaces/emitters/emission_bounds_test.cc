@@ -9,7 +9,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Triangles are not moved if the falloff depends on the height.
@@ -87,4 +87,4 @@ TEST_P(EmissionUpperBoundTest, IsInfiniteWhereTheBoxMayMeetTheTriangle) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

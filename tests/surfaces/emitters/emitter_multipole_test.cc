@@ -10,7 +10,7 @@
 #include "surfaces/emitters/implicit_surface.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // Triangles of a bumpy sheet that faces up, within 1 of the origin. sloped: with linear depth.
@@ -155,4 +155,4 @@ TEST(EmitterMultipole, AFineMeshIsSummedByFewer) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

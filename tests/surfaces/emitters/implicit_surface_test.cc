@@ -11,7 +11,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::Plate;
@@ -304,4 +304,4 @@ TEST(ImplicitSurface, DensityIsTrianglesOnASquareOfTheDepth) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

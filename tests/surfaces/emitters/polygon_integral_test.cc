@@ -11,7 +11,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using Corners = std::vector<Vec2>;  // counter-clockwise
@@ -88,4 +88,4 @@ TEST_P(PolygonIntegral, PartsAddUp) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -9,7 +9,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::RandomSurface;
@@ -137,4 +137,4 @@ TEST(Curvature, DegenerateFramesGiveNoCurvatureAndNoNaN) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

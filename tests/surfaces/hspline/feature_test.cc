@@ -8,7 +8,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::HasSubstr;
@@ -140,4 +140,4 @@ TEST(Feature, WhatDoesNotFitIsRefusedAndNothingChanges) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

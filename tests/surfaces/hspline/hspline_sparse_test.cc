@@ -10,7 +10,7 @@
 #include "surfaces/hspline/patch_tree.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::SmoothSurface;
@@ -265,4 +265,4 @@ INSTANTIATE_TEST_SUITE_P(
             .patches_u = 4, .patches_v = 4, .max_level = 8, .reference = OffsetReference::kWorld}));
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -14,7 +14,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::RandomSurface;
@@ -414,4 +414,4 @@ TEST(HSpline, RefusesWhatDoesNotFit) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

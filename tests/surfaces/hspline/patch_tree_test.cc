@@ -6,7 +6,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 constexpr HSplineShape kOpen{.patches_u = 4, .patches_v = 5, .max_level = 3};
@@ -53,4 +53,4 @@ TEST(PatchRegions, ASurfaceWithoutDetailIsOne) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

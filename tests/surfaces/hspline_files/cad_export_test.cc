@@ -24,7 +24,7 @@
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::RandomSurface;
@@ -130,4 +130,4 @@ INSTANTIATE_TEST_SUITE_P(
         ::testing::Values(CadFormat{".step", &SurfaceToStep}, CadFormat{".igs", &SurfaceToIges})));
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

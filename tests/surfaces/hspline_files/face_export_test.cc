@@ -14,7 +14,7 @@
 #include "surfaces/hspline_query/tessellate.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::RandomSurface;
@@ -164,4 +164,4 @@ TEST(FaceExport, AMeshThatGlTfCannotHoldIsRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

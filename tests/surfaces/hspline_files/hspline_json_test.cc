@@ -16,7 +16,7 @@
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 namespace fs = std::filesystem;
@@ -181,4 +181,4 @@ TEST(FeatureJson, FilesThatAreNotFeaturesAreNamedWithTheirFault) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,7 +7,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::RandomSurface;
@@ -122,4 +122,4 @@ TEST(HSplineBatch, ParametersThatAreNotFiniteAreNamed) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -7,7 +7,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::RandomSurface;
@@ -120,4 +120,4 @@ TEST(HSplineProject, FindsDetailOfLevelEight) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

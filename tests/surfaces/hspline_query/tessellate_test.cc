@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::RandomSurface;
@@ -142,4 +142,4 @@ TEST(AdaptiveTessellation, InvalidChordsAreRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

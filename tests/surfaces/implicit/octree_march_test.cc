@@ -5,7 +5,7 @@
 
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 class EmitterCacheTest : public ::testing::Test {
@@ -52,4 +52,4 @@ TEST_F(EmitterCacheTest, KeepsOneLayerOfEachDepthAndThatOfZero) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -10,7 +10,7 @@
 #include "surfaces/implicit_face.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::SphereMesh;
@@ -219,4 +219,4 @@ TEST_P(Bounds, HoldBesideAPrism) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -11,7 +11,7 @@
 #include "surfaces/marching/edge_intersections.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 SampleGrid CubeGrid(double half, int n) {
@@ -209,4 +209,4 @@ TEST(Polygonize, RefusesAnInvalidGrid) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

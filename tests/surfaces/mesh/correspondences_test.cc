@@ -5,7 +5,7 @@
 
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::SphereMesh;
@@ -43,4 +43,4 @@ TEST(Correspondences, NoneBesideAnOpenBorderIfThatIsRejected) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -6,7 +6,7 @@
 #include "surfaces/marching/polygonize.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 // A ball of 40 mm that a volume ends through at z = -20.
@@ -54,4 +54,4 @@ TEST(CutPlanes, WhatALackOfBoneMakesUpIsLeftOut) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

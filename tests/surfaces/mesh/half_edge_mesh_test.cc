@@ -12,7 +12,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::Joined;
@@ -182,4 +182,4 @@ TEST(HalfEdgeMesh, RingsGoAroundTheirVertex) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -8,7 +8,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::HasSubstr;
@@ -77,4 +77,4 @@ TEST(MeshCheck, RealScansAreOutward) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -12,7 +12,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::Joined;
@@ -256,4 +256,4 @@ TEST(PointQuery, RefusesNoneAndNotFinite) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

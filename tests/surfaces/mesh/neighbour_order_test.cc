@@ -8,7 +8,7 @@
 
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::Joined;
@@ -65,4 +65,4 @@ TEST(NeighbourOrder, APartKeepsTheOrderOfTheWhole) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

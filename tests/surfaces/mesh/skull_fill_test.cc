@@ -6,7 +6,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 TEST(Remesh, MakesEdgesOfTheLengthAsked) {
@@ -29,4 +29,4 @@ TEST(Remesh, RefusesWhatItCannotTake) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

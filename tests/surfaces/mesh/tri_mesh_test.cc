@@ -10,7 +10,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using testing::Plate;
@@ -127,4 +127,4 @@ TEST(VertexClusters, ACellMustHaveASize) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

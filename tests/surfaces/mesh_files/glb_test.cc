@@ -10,7 +10,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using Json = nlohmann::json;
@@ -128,4 +128,4 @@ TEST(Glb, WhatGlTfCannotHoldIsRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

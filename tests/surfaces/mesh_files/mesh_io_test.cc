@@ -12,7 +12,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::HasSubstr;
@@ -190,4 +190,4 @@ TEST_F(MeshIo, RealScansAreReadWhole) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -34,7 +34,7 @@ std::size_t largest_allocation = 0;  // bytes, since it was last set to 0
 [[gnu::noinline]] void operator delete(void* memory) noexcept { std::free(memory); }
 [[gnu::noinline]] void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::HasSubstr;
@@ -489,4 +489,4 @@ TEST(MeshReaders, EveryFaultIsNamedWithItsPlace) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

@@ -11,7 +11,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::surfaces {
 namespace {
 
 using ::testing::ElementsAre;
@@ -131,4 +131,4 @@ TEST(VtkXml, AttributesOfAnotherSizeAreRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::surfaces

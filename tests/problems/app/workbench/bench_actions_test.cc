@@ -8,7 +8,7 @@
 #include "problems/app/workbench/bench_state.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -193,4 +193,4 @@ TEST(BenchHistory, TheTextIsReadBackToTheSameHistory) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include "surfaces/hspline_query/tessellate.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::RandomSurface;
@@ -52,4 +52,4 @@ TEST(PullMoves, HaveAnErrorThatVanishesWithThePullIfDetailTurns) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

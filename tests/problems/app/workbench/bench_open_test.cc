@@ -20,7 +20,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -281,4 +281,4 @@ TEST_F(WorkbenchOpening, LandmarksOnTheBoneMoveWithItsFrame) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

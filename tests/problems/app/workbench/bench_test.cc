@@ -23,7 +23,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -160,7 +160,7 @@ TEST_F(WorkbenchBench, ARunOfTheFolderGivesTheSameFaceWithItsEdits) {
   RunUntilEnd(bench);
   EXPECT_TRUE(bench.TakeSnapshot().run_saved);
   const auto experiment = ReadConfig<Experiment>(bench.Folder() / "config.yaml");
-  const RunResult again = semblance::Run(experiment, {});
+  const RunResult again = problems::Run(experiment, {});
   const HSplineSurface face = bench.Full().surface;
   EXPECT_EQ(face.Offsets(), again.fit.surface.Offsets());
   EXPECT_EQ(ReadHSpline(bench.Folder() / "run/face.hspline.json").Offsets(), face.Offsets());
@@ -277,7 +277,7 @@ TEST_F(WorkbenchBench, AFullVariantIsTheRunOfItsBuild) {
     AwaitEnd(bench);
     const std::vector<std::string> obese = {"tissue.build=obese"};
     const RunResult again =
-        semblance::Run(ReadConfig<Experiment>(bench.Folder() / "config.yaml", obese), {});
+        problems::Run(ReadConfig<Experiment>(bench.Folder() / "config.yaml", obese), {});
     EXPECT_EQ(bench.FullVariant(BenchVariant::kObese).surface.Offsets(),
               again.fit.surface.Offsets());
     EXPECT_FALSE(fs::exists(bench.Folder() / "run")) << "variants do not touch run/";
@@ -325,4 +325,4 @@ TEST_F(WorkbenchBench, AFolderWithOtherFilesIsRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -21,7 +21,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -289,4 +289,4 @@ TEST_F(WorkbenchServer, OnlyOneLoopbackAddressAnswers) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

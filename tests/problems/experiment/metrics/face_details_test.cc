@@ -15,7 +15,7 @@
 #include "problems/subject/phantom.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::Plate;
@@ -110,4 +110,4 @@ TEST(FeatureDistortion, TheMoreTheirOffsetsAreHeldTheMoreFeaturesAreStrained) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

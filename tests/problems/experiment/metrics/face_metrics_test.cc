@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::Plate;
@@ -223,4 +223,4 @@ TEST(FaceMetrics, SymmetricIsTheMeanOfBothDirections) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include "problems/subject/phantom.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 const Phantom& Head() {
@@ -109,4 +109,4 @@ TEST(ScoredSkin, TheNetworkIsStillThereToBeChosen) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

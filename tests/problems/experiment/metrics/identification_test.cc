@@ -10,7 +10,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -109,4 +109,4 @@ TEST(Identification, WithoutCommonLandmarksThereIsNoDistance) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

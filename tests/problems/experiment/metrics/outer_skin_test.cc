@@ -10,7 +10,7 @@
 #include "surfaces/marching/polygonize.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::Joined;
@@ -123,4 +123,4 @@ TEST(OuterSkin, RefusesWhatIsNoHead) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

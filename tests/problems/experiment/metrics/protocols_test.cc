@@ -9,7 +9,7 @@
 #include "problems/subject/phantom.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::Plate;
@@ -99,4 +99,4 @@ TEST(ViewRay, LeavesOutWhatIsHiddenSteepOrBesideTheFace) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::DoubleNear;
@@ -134,4 +134,4 @@ TEST(Friedman, RefusesWhatIsNoTable) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

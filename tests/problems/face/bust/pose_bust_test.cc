@@ -30,7 +30,7 @@
 #include "tests/testing/scratch_folder.h"
 #include "tests/testing/splines.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::DoubleNear;
@@ -585,4 +585,4 @@ TEST(HeadDomain, FoldsNowhere) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

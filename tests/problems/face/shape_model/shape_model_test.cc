@@ -15,7 +15,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -466,4 +466,4 @@ TEST(ShapePosterior, SigmaGrowsWhereNoTipIsNear) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -18,7 +18,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -123,4 +123,4 @@ TEST(ChildProcess, AStopEndsTheWork) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -6,7 +6,7 @@
 
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -136,4 +136,4 @@ TEST(CoarserVolume, TooFewVoxelsAreAClearError) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

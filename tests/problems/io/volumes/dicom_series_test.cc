@@ -9,7 +9,7 @@
 
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -99,4 +99,4 @@ TEST(SliceStack, AnIrregularStackIsRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

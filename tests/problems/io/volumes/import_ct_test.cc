@@ -11,7 +11,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -257,4 +257,4 @@ TEST_F(ImportCtTest, ACoarserImportKeepsTheEdgesAndIsNoted) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -111,4 +111,4 @@ TEST(Invesalius, EachFaultIsNamed) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

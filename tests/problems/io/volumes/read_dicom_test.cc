@@ -16,7 +16,7 @@
 #include "problems/io/volumes/import_ct.h"
 #include "tests/testing/volume_files.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -164,4 +164,4 @@ TEST_F(ReadDicomTest, EncodedSlicesAreReadBack) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -19,7 +19,7 @@
 
 #include "tests/testing/volume_files.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
@@ -343,4 +343,4 @@ TEST_F(ReadVolumeTest, SpacesWithoutSidesAreNotedOrRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -9,7 +9,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 const VoxelGrid kGrid{{9, 8, 7}, Vec3(1, 1.5, 0.7)};
@@ -122,4 +122,4 @@ TEST(VoxelMask, AFloodIsTheComponentsThatContainASeed) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -14,7 +14,7 @@
 #include "surfaces/mesh_files/srgb.h"
 #include "tests/testing/pixels.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -162,4 +162,4 @@ TEST(ColourMap, StepsRunFromEndToEndAndLinesBetweenThemAreClose) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

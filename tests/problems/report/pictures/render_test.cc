@@ -18,7 +18,7 @@
 #include "tests/testing/pixels.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using testing::PixelAt;
@@ -370,4 +370,4 @@ TEST(Pictures, SheetHoldsEachViewUnchangedAtOneScale) {
 TEST(Pictures, ASheetNeedsAPicture) { EXPECT_THROW(ContactSheet({}), InputError); }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scratch_file.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -119,4 +119,4 @@ TEST_F(OneSite, AnUnknownOneIsRefusedInWords) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -12,7 +12,7 @@
 #include "problems/report/pictures/colour_map.h"
 #include "surfaces/base/error.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -64,4 +64,4 @@ TEST(HeatMap, RowsOfAnotherLengthAreRefused) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

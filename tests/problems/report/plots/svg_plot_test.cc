@@ -8,7 +8,7 @@
 #include <limits>
 #include <pugixml.hpp>
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -187,4 +187,4 @@ TEST(Histogram, AFarOutlierEndsTheAxisEarly) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -15,7 +15,7 @@
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
@@ -324,4 +324,4 @@ TEST(RankAgreement, RefusesTwoTreatments) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

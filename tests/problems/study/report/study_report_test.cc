@@ -13,7 +13,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -200,4 +200,4 @@ TEST(Sqlite, SameResultsGiveSameBytes) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

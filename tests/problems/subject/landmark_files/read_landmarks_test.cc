@@ -11,7 +11,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/scratch_folder.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -326,4 +326,4 @@ TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

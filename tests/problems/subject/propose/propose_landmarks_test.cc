@@ -12,7 +12,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::ElementsAre;
@@ -208,4 +208,4 @@ TEST(CompareProposal, NoCommonSiteIsAnError) {
 
 }  // namespace
 
-}  // namespace semblance
+}  // namespace semblance::problems

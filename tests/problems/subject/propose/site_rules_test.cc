@@ -9,7 +9,7 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 // A ball instead of a skull, because its farthest point in a direction is known.
@@ -73,4 +73,4 @@ TEST(SiteRules, InTheMidlineASiteStaysThere) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems

@@ -8,7 +8,7 @@
 #include "surfaces/base/random.h"
 #include "tests/testing/shapes.h"
 
-namespace semblance {
+namespace semblance::problems {
 namespace {
 
 using ::testing::HasSubstr;
@@ -95,4 +95,4 @@ TEST(SkullPose, ANeedleIsNoSkull) {
 }
 
 }  // namespace
-}  // namespace semblance
+}  // namespace semblance::problems
