@@ -1,18 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-# The front door: sets up, builds, runs. All that it knows stands in .ci/packages.txt, CMakePresets.json and configs/.
+# The entry point: installs packages, builds, runs. Everything it needs to know is in .ci/packages.txt, CMakePresets.json and configs/.
 PACKAGES      = $(shell sed 's/#.*//' .ci/packages.txt)
 RUN_PACKAGES  = $(shell grep -v '# tests' .ci/packages.txt | sed 's/#.*//')
 SUDO         := $(if $(filter 0,$(shell id -u)),,sudo)
 PRESET       ?= release
 BUILD        := $(if $(filter sanitize debug quick threads coverage,$(PRESET)),build-$(PRESET),build)
+PROGRAM      := $(BUILD)/problems/semblance
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build deb demo demo-phantom test bench faults attack same-bytes clang-numbers pairwise pairwise-share fuzz sanitize races coverage format check headers tidy configs clean site
+.PHONY: all setup configure build demo demo-phantom deb site test harness bench same-bytes clang-numbers sanitize races coverage \
+  format check headers tidy configs clean
 
 all: build
 
 setup:
+	@command -v apt-get > /dev/null || { echo "make installs packages with apt-get, which this system lacks. Install the counterparts of these" \
+	  "Debian packages by hand and call cmake --preset release, or use the Containerfile:"; echo $(PACKAGES); exit 1; }
 	@missing=""; for p in $(PACKAGES); do \
 	  dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || missing="$$missing $$p"; done; \
 	if [ -n "$$missing" ]; then echo "installing:$$missing"; \
@@ -25,27 +29,17 @@ configure: setup
 build: configure
 	@cmake --build --preset $(PRESET)
 
-# Debian packages of the program and of the libraries, in build/packages.
-deb: build
-	@cd $(BUILD) && cpack > packages.log || { cat packages.log; exit 1; }
-	@ls $(BUILD)/packages/*.deb
+# The targets demo, demo-phantom and deb build without the tests, many sources per compilation: the fastest way from nothing.
+demo demo-phantom deb: PACKAGES = $(RUN_PACKAGES)
+demo demo-phantom deb: PRESET = quick
 
-# The documents as static pages, in out/site.
-site: PACKAGES = $(shell grep -E '^python3(-markdown-it)? ' .ci/packages.txt | sed 's/#.*//')
-site: setup
-	@/usr/bin/python3 docs/site.py out/site
-
-# The program alone, in the way that builds fastest from nothing: the tests would double the time.
-demo: PACKAGES = $(RUN_PACKAGES)
-demo: PRESET = quick
+# A face from a real head CT.
 demo: configure
 	@cmake --build --preset quick --target semblance
 	@build-quick/problems/semblance run configs/demo.yaml --out $(DEMO_OUT) --force
 
-# A whole head that is made up and lacks a cheek bone: its CT as DICOM, skull and skin of it, landmarks proposed (and how far off), the cheek
-# mirrored, its face and head, the score. The folder is that of the configuration.
-demo-phantom: PACKAGES = $(RUN_PACKAGES)
-demo-phantom: PRESET = quick
+# Every step on a synthetic head that lacks a cheek bone: its CT as DICOM, skull and skin, proposed landmarks and their errors, the mirrored
+# cheek, face and head, the score.
 demo-phantom: PHANTOM = out/demo-phantom
 demo-phantom: configure
 	@cmake --build --preset quick --target semblance
@@ -55,10 +49,28 @@ demo-phantom: configure
 	  --compare $(PHANTOM)/head/landmarks.yaml --force
 	@build-quick/problems/semblance run configs/demo_phantom/head.yaml --out $(PHANTOM)/run --force
 
+# Debian packages of program, libraries and Python module, in build-quick/packages.
+deb: PACKAGES = $(RUN_PACKAGES) dpkg-dev pybind11-dev python3-dev python3-numpy
+deb: configure
+	@cmake --build --preset quick
+	@cd build-quick && cpack > packages.log || { cat packages.log; exit 1; }
+	@ls build-quick/packages/*.deb
+
+# The documents as static pages, in out/site.
+site: PACKAGES = $(shell grep -E '^python3(-markdown-it)? ' .ci/packages.txt | sed 's/#.*//')
+site: setup
+	@/usr/bin/python3 docs/site.py out/site
+
 test: build
 	@ctest --preset $(PRESET) -j "$$(nproc)"
 
-# Measures against peers in one run; build/bench.json holds the lines and the machine.
+# Hostile calls, injected faults, pairs of options, fuzzing. ONLY selects some of: attack faults pairwise fuzz (docs/explanation/reliability.md).
+# SEED, COUNT, PAIRS, SHARE and MINUTES set how much of each.
+export SEED COUNT PAIRS SHARE MINUTES JOBS
+harness: build
+	@tests/harness/harness.sh $(PROGRAM) configs $(ONLY)
+
+# Our program against peers, measured in one run; build/bench.json holds the entries and the machine.
 bench: build
 	@cmake --build build --target bench
 	@for program in build/tests/bench/*_bench; do echo "$$program" >&2; $$program; done | tee build/bench.lines >&2
@@ -66,98 +78,64 @@ bench: build
 	  echo '"entries": ['; grep '^{' build/bench.lines | sed '$$!s/$$/,/'; echo ']}'; } > build/bench.json; rm build/bench.lines
 	@echo build/bench.json
 
-# Kills, full disks, little memory, damaged files: a table of how many fell short (docs/reliability.md).
-COUNT        ?= 100
-faults: build
-	@tests/faults/faults.sh $(BUILD)/problems/semblance configs $(COUNT)
-
-# Over 2,000 hostile calls of every command; SEED draws others (docs/reliability.md).
-SEED         ?= 1
-attack: build
-	@python3 -B tests/attack/attack.py $(BUILD)/problems/semblance configs --seed $(SEED) --jobs "$$(nproc)"
-
-# A run, a depth and a fit in many surroundings, and by programs for older processors: the same bytes (docs/reliability.md).
+# A run, a depth and a fit in many environments, and by programs for older processors, give the same bytes.
 same-bytes: build
 	@for bits in 256 128; do \
 	  cmake --preset $(PRESET) -B build-$$bits -DSEMBLANCE_WIDEST_BITS=$$bits -DBUILD_TESTING=OFF > /dev/null && \
 	  cmake --build build-$$bits --target semblance || exit 1; done
-	@python3 -B tests/faults/same_bytes.py $(BUILD)/problems/semblance configs --program "no AVX-512"=build-256/problems/semblance \
+	@python3 -B tests/harness/same_bytes.py $(PROGRAM) configs --program "no AVX-512"=build-256/problems/semblance \
 	  --program "no AVX"=build-128/problems/semblance
 
-# The same by a program of clang's: numbers within 1e-9. It is built in the way that is fastest from nothing.
+# A program compiled by clang gives the same numbers within 1e-9.
 clang-numbers: build
 	@CXX=clang++ cmake --preset quick -B build-clang -DCMAKE_CXX_FLAGS_RELEASE="-O1 -DNDEBUG" -DSEMBLANCE_WITH_CAD=OFF -DSEMBLANCE_WITH_ITK=OFF > /dev/null
 	@cmake --build build-clang --target semblance
-	@python3 -B tests/faults/same_bytes.py $(BUILD)/problems/semblance configs --compiler clang=build-clang/problems/semblance --compilers-only
+	@python3 -B tests/harness/same_bytes.py $(PROGRAM) configs --compiler clang=build-clang/problems/semblance --compilers-only
 
-# All pairs of options, each run on the smallest phantom or a few points, or refused at once (docs/reliability.md).
-PAIRS        ?= 1000000
-pairwise: build
-	@python3 -B tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --cases $(PAIRS)
-	@python3 -B tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --cases $(PAIRS)
-
-# Of these what 50 seconds of processor are enough for, others every day.
-pairwise-share: build
-	@python3 -B tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind fit --share 20 --seed day
-	@python3 -B tests/pairwise/pairwise.py $(BUILD)/problems/semblance configs --kind experiment --share 30 --seed day
-
-# Each reader under libFuzzer with ASan and UBSan for so many minutes, JOBS at a time; needs clang and its runtime (docs/reliability.md).
-MINUTES      ?= 10
-JOBS         ?= $(shell nproc)
-FUZZERS       = mesh_reader_fuzz config_fuzz text_reader_fuzz invesalius_fuzz volume_fuzz
-fuzz:
-	@CXX=clang++ cmake -G Ninja -B build-fuzz -DSEMBLANCE_FUZZ=ON -DBUILD_TESTING=ON > /dev/null
-	@cmake --build build-fuzz --target $(FUZZERS)
-	@JOBS=$(JOBS) tests/fuzz/fuzz.sh build-fuzz/tests/fuzz $(MINUTES) $(FUZZERS)
-
-# The tests once more, with AddressSanitizer and UndefinedBehaviorSanitizer.
+# The tests with AddressSanitizer and UndefinedBehaviorSanitizer.
 sanitize:
 	@$(MAKE) --no-print-directory test PRESET=sanitize
 
-# Those that start threads, with ThreadSanitizer.
-RACES         = parallel_test polygonize_test implicit_face_test depth_direction_test cross_validation_test interpolate_depth_test \
-  face_metrics_test render_test run_test disk_cache_test import_ct_test recentre_test relaxation_test shape_model_test space_solve_test bench_test \
-  http_server_test nested_solve_test study_test
+# The tests that start threads, with ThreadSanitizer: a regular expression over the names of tests.
+RACES        ?= Parallel|Polygonize|ImplicitFace|DepthDirection|CrossValidation|InterpolateDepth|FaceMetrics|Render|^problems\.|DiskCache|ImportCt|Recentre|Relaxation|ShapeModel|SpaceSolve|Bench|HttpServer|NestedSolve|Study
 races: setup
 	@cmake --preset threads > /dev/null
-	@cmake --build --preset threads --target $(RACES)
-	@ctest --preset threads -R "^($$(echo $(RACES) | tr ' ' '|'))\."
+	@cmake --build --preset threads
+	@ctest --preset threads -R "$(RACES)"
 
-# Lines and branches of what reads files (READERS) that these tests pass; COVERED=. READERS=. for all of both. Needs gcovr.
-# Not on a full disk: there the counts cannot be written either.
-COVERED      ?= mesh_io_test|mesh_readers_test|vtk_xml_test|glb_test|npy_test|csv_test|json_text_test|hspline_json_test|feature_test|config_edit_test|config_test|value_filter_test|terminal_text_test|command_line_test|input_check_test|read_landmarks_test|landmark_commands_test|point_files_test|point_table_test|fit_command_test|point_fit_test|apart_test|invesalius_test|ct_volume_test|read_volume_test|read_dicom_test|read_nifti_test|read_nrrd_test|slice_stack_test|import_ct_test|import_commands_test|network_file_test|tissue_table_test|template_io_test|edit_script_test|condition_depths_test|depth_spread_test|population_run_test|trust_test|trial_folder_test
-READERS      ?= surfaces/mesh_files/|surfaces/base/(csv|json_text|npy)|surfaces/hspline_files/(hspline_json|json_parts|feature)|problems/config/|problems/volumes/|problems/landmark_files/(fcsv|landmark_table|markups|picked|point_lines|read)|problems/points/point_(files|table)|problems/subject/(network_file|tissue_table)|problems/edits/edit_script|problems/face_template/template_io|problems/study/trial_folder
+# Lines and branches that the tests execute, in the sources that read files (READERS); READERS=. for all sources. Needs gcovr. Not on a full
+# disk: the counts could not be written.
+READERS      ?= surfaces/mesh_files/|surfaces/base/(csv|json_text|npy)|surfaces/hspline_files/(hspline_json|json_parts)|problems/config/|problems/io/volumes/|problems/subject/landmark_files/|problems/points/point_(files|table)|problems/subject/(network_file|tissue_table)|problems/face/(edit_script|template_io)|problems/study/trial_folder
 coverage: setup
 	@cmake --preset coverage "-DSEMBLANCE_COVERAGE=$(READERS)" > /dev/null
-	@cmake --build --preset coverage --target $(if $(filter .,$(COVERED)),all,$(subst |, ,$(COVERED)))
-	@ctest --preset coverage -j "$$(nproc)" -R "^($(COVERED))" -E AFullDisk --quiet; \
+	@cmake --build --preset coverage
+	@ctest --preset coverage -j "$$(nproc)" -E AFullDisk --quiet; \
 	gcovr -r . build-coverage -j "$$(nproc)" --exclude-throw-branches --exclude-unreachable-branches -e tests/ --json build-coverage/coverage.json
 	@python3 tests/coverage.py build-coverage/coverage.json "$(READERS)"
 
 format: setup
 	@git ls-files '*.h' '*.cc' | xargs clang-format -i
 
-# All that is looked at beside the tests.
+# Everything that CI checks beside the tests.
 check: build headers tidy configs
 	@git ls-files '*.h' '*.cc' | xargs clang-format --dry-run -Werror
 
-# Each header compiles alone; in a build without precompiled headers most are proven by their own source.
+# Each header compiles alone; in a build without precompiled headers its own source proves that for most.
 headers: build
 	@cmake --build --preset $(PRESET) --target all_verify_interface_header_sets
 
-# clang-tidy on the sources that changed since BASE, a commit. clang cannot read the precompiled headers of g++, and
-# takes its options for memory as errors.
+# clang-tidy on the sources changed since BASE, a commit. clang cannot read g++'s precompiled headers and rejects its memory options.
 tidy: setup
 	@cmake --preset $(PRESET) -B build-tidy -DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON -DSEMBLANCE_AMPLE_MEMORY=OFF > /dev/null
 	@git diff --name-only --diff-filter=d $(BASE) -- 'surfaces/*.cc' 'interp/*.cc' 'fitting/*.cc' 'problems/*.cc' | \
 	  xargs -r -n 1 -P $$(nproc) clang-tidy -p build-tidy --quiet --extra-arg=-Wno-unknown-warning-option
 
-# Every configuration and every study is one that the program takes, with all inputs that it names; the heads' and the demo's own are not in
-# this project, and published.yaml names no subject.
+# The program accepts every configuration and study, with all files that they name. The real heads and the results of the demos are not part
+# of the project, and published.yaml names no subject: their inputs are not opened.
 configs: PUBLISHED = configs/published.yaml
 configs: build
-	@$(BUILD)/problems/semblance check $(filter-out $(PUBLISHED),$(wildcard configs/*.yaml)) configs/fit/*.yaml configs/studies/*.yaml
-	@$(BUILD)/problems/semblance check --without-inputs $(PUBLISHED) configs/heads/*.yaml configs/demo_phantom/*.yaml configs/population/*.yaml
+	@$(PROGRAM) check $(filter-out $(PUBLISHED),$(wildcard configs/*.yaml)) configs/fit/*.yaml configs/studies/*.yaml
+	@$(PROGRAM) check --without-inputs $(PUBLISHED) configs/heads/*.yaml configs/demo_phantom/*.yaml configs/population/*.yaml
 
 clean:
-	@rm -rf build build-debug build-sanitize build-quick build-tidy build-fuzz build-threads build-coverage build-clang build-256 build-128
+	@rm -rf build build-*

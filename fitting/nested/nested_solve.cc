@@ -12,7 +12,7 @@ namespace semblance::fitting {
 namespace {
 
 constexpr int kMaxGradientSteps =
-    300;  // solves take up to about 80 steps (docs/fit.md); bounds the loop
+    300;  // solves take up to about 80 steps (docs/explanation/fit.md); bounds the loop
 
 using Shares = std::vector<std::vector<double>>;  // by level and patch
 

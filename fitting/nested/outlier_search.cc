@@ -12,7 +12,7 @@
 namespace semblance::fitting {
 namespace {
 
-// The constants were chosen on the point sets of docs/fit.md, "How good it is".
+// The constants were chosen on the point sets of docs/explanation/fit.md, "How good it is".
 
 // Points that share a median; half as many more on each side enter it. Larger blocks give steadier
 // medians, smaller ones follow detail.

@@ -15,7 +15,7 @@ namespace {
 // Smallest statistic of detail: at 1 the gain of the functions equals their cost in variance.
 constexpr double kMinEvidence = 1;
 // Share of a patch's finer patches that must detect detail. Less follows noise, more misses detail
-// in a part of the patch (chosen on the sets of docs/fit.md, "How good it is").
+// in a part of the patch (chosen on the sets of docs/explanation/fit.md, "How good it is").
 constexpr double kMinShare = 0.15;
 
 // Per function of a level, by GridLayout::At: the square of the residuals' sum, and the sum of

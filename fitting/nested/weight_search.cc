@@ -12,7 +12,7 @@ namespace semblance::fitting {
 namespace {
 
 // The constants below trade solves (time) against a better score. They were chosen on the sets of
-// docs/fit.md, "How good it is".
+// docs/explanation/fit.md, "How good it is".
 
 // Largest weight, relative to the weight at which points and energy balance. Only a plane is left
 // there.

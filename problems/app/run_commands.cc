@@ -369,7 +369,7 @@ int ImportCtCommand(const Arguments& arguments) {
   fmt::print("folder: {}\n", root.string());
   if (!mr) {
     fmt::print(
-        "next: pick landmarks on skull.ply (3D Slicer, MeshLab, CloudCompare; docs/first-face.md), "
+        "next: pick landmarks on skull.ply (3D Slicer, MeshLab, CloudCompare; docs/tutorial/first-face.md), "
         "then\n  semblance landmarks convert PICKED {}\n",
         (folder.Root() / "landmarks.yaml").string());
   }

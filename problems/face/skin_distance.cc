@@ -17,7 +17,7 @@
 namespace semblance::problems {
 namespace {
 
-// Normals within 60 degrees (docs/real-heads.md). A smaller cosine matches more of the skin that
+// Normals within 60 degrees (docs/experiments/real-heads.md). A smaller cosine matches more of the skin that
 // the face meets aslant, but also more of the walls of nostrils and lids.
 constexpr double kLeastCosine = 0.5;
 

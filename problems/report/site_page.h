@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// docs/sites.md: each site's names, its place on the bone, and the tables that have it.
+// docs/reference/sites.md: each site's names, its place on the bone, and the tables that have it.
 #pragma once
 
 #include <span>

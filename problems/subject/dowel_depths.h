@@ -175,7 +175,7 @@ void Fields(Visitor& visit, TissueOptions& o) {
                   .doc = "facts known about this person: the table's depths become those "
                          "expected for people with these depths, sex, build, age or body mass "
                          "index, and the standard deviations become the remaining uncertainty; the "
-                         "interpolation uses both (docs/populations.md)"},
+                         "interpolation uses both (docs/how-to/populations.md)"},
         o.given);
 }
 template <class Report>

@@ -34,7 +34,7 @@ namespace {
 
 // The largest error of a sound collapse, as a share of the square root of the area around it.
 // Larger leaves fewer triangles where the surface is thin or rough, but ruins its shape;
-// docs/implicit.md.
+// docs/explanation/implicit.md.
 constexpr double kMostErrorOfSize = 0.15;
 // Holds the merged vertex at the middle of its edge in directions in which the quadric is flat. It
 // trades a tiny offset for stability; see MinimumNear.

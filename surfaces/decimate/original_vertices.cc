@@ -11,7 +11,7 @@
 namespace semblance::surfaces {
 namespace {
 
-// More rounds gain little: two lower the RMS by an eighth and more (docs/implicit.md).
+// More rounds gain little: two lower the RMS by an eighth and more (docs/explanation/implicit.md).
 constexpr int kSettleRounds = 2;
 // The share of a step that is taken. Neighbours move in the same round, so a whole step would
 // overshoot.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The second-order multipole expansion of the joint far field of several flat emitters, with a
-// bound on its error (docs/mathematics.md, 2).
+// bound on its error (docs/explanation/mathematics.md, 2).
 #pragma once
 
 #include <array>

@@ -14,7 +14,7 @@ namespace {
 constexpr int kLanes = EmissionUpperBound::kLanes, kLeaf = 4;
 static_assert(kLanes == FlatEmitterLanes::kLanes && kLanes == DistanceEmitterLanes::kLanes);
 // Emitters are summed by multipoles only if this errs less than this share of leaving them out. A
-// larger share spends more of the error budget on multipoles (docs/mathematics.md, "The far
+// larger share spends more of the error budget on multipoles (docs/explanation/mathematics.md, "The far
 // field").
 constexpr double kMaxErrorShare = 0.25;
 

