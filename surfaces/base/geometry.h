@@ -52,4 +52,11 @@ double DistanceToSegment(const Vec& p, const Vec& a, const Vec& b) {
   return (p - a - t * ab).norm();
 }
 
+// Returns the matrix M with M w = v x w.
+inline Mat3 CrossMatrix(const Vec3& v) {
+  Mat3 m;
+  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return m;
+}
+
 }  // namespace semblance::surfaces

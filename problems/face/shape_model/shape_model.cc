@@ -95,12 +95,6 @@ std::span<const double> AsSpan(const Eigen::VectorXd& v) {
 
 }  // namespace
 
-Mat3 CrossMatrix(const Vec3& v) {
-  Mat3 m;
-  m << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-  return m;
-}
-
 ShapeFrame StartFrame(const ShapeModel& model, const Similarity& subject_from_model) {
   return {subject_from_model.rotation, MeanPoint(model.mean.points)};
 }

@@ -58,9 +58,6 @@ struct ShapeParameters {
   Eigen::Index size() const { return 7 + coefficients.size() + field.size(); }
 };
 
-// The matrix that maps w to v x w.
-Mat3 CrossMatrix(const Vec3& v);
-
 // The parameters of the mean shape under a similarity.
 ShapeParameters StartParameters(const ShapeFrame& frame, const Similarity& subject_from_model,
                                 Eigen::Index modes, Eigen::Index centres);
