@@ -55,7 +55,7 @@ const std::map<std::string, Ranks> kModules = {
       {kFrontDoor},
       {"evaluation"}}},
     {"fitting",
-     {{"least_squares", "problem"},
+     {{"folds", "least_squares", "problem"},
       {"parameters", "space"},
       {"terms"},
       {"nested", "solve"},

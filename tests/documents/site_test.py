@@ -58,7 +58,7 @@ def main():
         folder = pathlib.Path(temporary).resolve() / "site"
         subprocess.run([sys.executable, source / "docs" / "site.py", folder], check=True, stdout=subprocess.DEVNULL)
         faults = list(faults_of(folder))
-        documents = [*(source / "docs").glob("*.md"), source / "README.md"]
+        documents = [*(source / "docs").rglob("*.md"), source / "README.md"]
         if len(list(folder.glob("*.html"))) != len(documents):
             faults.append(f"{len(documents)} documents, but another number of pages")
         # A planted fault is found.

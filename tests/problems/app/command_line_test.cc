@@ -281,15 +281,15 @@ std::vector<std::string> CommandsIn(const std::string& help) {
   return names;
 }
 
-TEST_F(CommandLine, TheReadmeHasEveryCommandAndNoOther) {
+TEST_F(CommandLine, TheReferenceHasEveryCommandAndNoOther) {
   const std::vector<std::string> commands = CommandsIn(Call("--help").out);
   EXPECT_THAT(commands, AllOf(::testing::Contains("run"), ::testing::Contains("feature")));
-  const std::string readme = ReadFileBytes(SEMBLANCE_SOURCE_DIR "/README.md");
+  const std::string page = ReadFileBytes(SEMBLANCE_SOURCE_DIR "/docs/reference/commands.md");
   for (const std::string& command : commands) {
-    EXPECT_THAT(readme, HasSubstr("\n    semblance " + command + " ")) << command;
+    EXPECT_THAT(page, HasSubstr("\n    semblance " + command + " ")) << command;
   }
   const std::regex entry("\n    semblance ([a-z-]+)");
-  for (std::sregex_iterator it(readme.begin(), readme.end(), entry), end; it != end; ++it) {
+  for (std::sregex_iterator it(page.begin(), page.end(), entry), end; it != end; ++it) {
     EXPECT_THAT(commands, ::testing::Contains((*it)[1].str()));
   }
 }

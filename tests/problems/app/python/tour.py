@@ -6,7 +6,7 @@ import sys
 import tempfile
 
 source = os.path.abspath(sys.argv[1])
-with open(os.path.join(source, "docs", "python.md"), encoding="utf-8") as page:
+with open(os.path.join(source, "docs", "how-to", "python.md"), encoding="utf-8") as page:
     blocks = re.findall(r"^```python\n(.*?)^```$", page.read(), re.M | re.S)
 assert len(blocks) >= 4, len(blocks)
 names = {"CONFIGS": os.path.join(source, "configs")}
