@@ -18,11 +18,11 @@
 namespace semblance::surfaces {
 namespace {
 
-using Kernel = std::variant<FlatKernel, DistanceKernel>;
+using AnyKernel = std::variant<FlatKernel, DistanceKernel>;
 
-Kernel MakeKernel(const FlatEmitter& o) { return FlatKernel(o); }
-Kernel MakeKernel(const SplitEmitter& o) { return DistanceKernel(o); }
-Kernel MakeKernel(const ThesisEmitter& o) { return DistanceKernel(o); }
+AnyKernel MakeKernel(const FlatEmitter& o) { return FlatKernel(o); }
+AnyKernel MakeKernel(const SplitEmitter& o) { return DistanceKernel(o); }
+AnyKernel MakeKernel(const ThesisEmitter& o) { return DistanceKernel(o); }
 
 EmitterDepth DepthOver(const Emitter& emitter) {
   const auto* flat = std::get_if<FlatEmitter>(&emitter);
@@ -33,7 +33,7 @@ EmitterDepth DepthOver(const Emitter& emitter) {
 // margin.
 constexpr double kFlatShare = 0.025;
 
-void SetGains(const Kernel& kernel, std::vector<EmitterTriangle>& emitters) {
+void SetGains(const AnyKernel& kernel, std::vector<EmitterTriangle>& emitters) {
   std::visit(
       [&emitters](const auto& k) {
         for (EmitterTriangle& t : emitters) {
@@ -48,13 +48,13 @@ void SetGains(const Kernel& kernel, std::vector<EmitterTriangle>& emitters) {
 std::vector<EmitterTriangle> MakeEmittersWithGains(const TriMesh& skull,
                                                    std::span<const double> depth_mm,
                                                    EmitterDepth over_triangle,
-                                                   const Kernel& kernel) {
+                                                   const AnyKernel& kernel) {
   std::vector<EmitterTriangle> emitters = MakeEmitters(skull, depth_mm, over_triangle);
   SetGains(kernel, emitters);
   return emitters;
 }
 
-EmitterSearchOptions SearchOptions(const Kernel& kernel, double tail_error) {
+EmitterSearchOptions SearchOptions(const AnyKernel& kernel, double tail_error) {
   return std::visit(
       [tail_error]<class EmitterKernel>(const EmitterKernel& k) {
         EmitterSearchOptions options{k.Fall(), EmitterKernel::kRun, false, tail_error};
@@ -76,7 +76,7 @@ double CubeSize(const std::vector<EmitterTriangle>& emitters, bool cut) {
   return of_depth * sum / static_cast<double>(emitters.size());
 }
 
-bool HasCut(const Kernel& kernel) {
+bool HasCut(const AnyKernel& kernel) {
   return std::visit([](const auto& k) { return k.Fall().cut; }, kernel) > 0;
 }
 
@@ -171,7 +171,7 @@ struct ImplicitSurface::Impl {
                       kernel);
   }
 
-  Kernel kernel;
+  AnyKernel kernel;
   std::vector<EmitterTriangle> emitters;
   EmitterSearch search;
   NeighbourListCache neighbours;
