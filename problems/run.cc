@@ -18,9 +18,9 @@
 namespace semblance::problems {
 namespace {
 
-using Files = std::vector<std::filesystem::path>;
+using InputPaths = std::vector<std::filesystem::path>;
 
-void Append(const Files& more, Files& files) {
+void Append(const InputPaths& more, InputPaths& files) {
   files.insert(files.end(), more.begin(), more.end());
 }
 
@@ -189,7 +189,7 @@ void FaceJob::LoadTemplateAndPrior() {
   prior_ =
       step_("load prior", [&] { return LoadExperimentPrior(experiment_, *generic_, cache_, context_); });
   Append(TemplateFiles(source), subject_.inputs);
-  Append(prior_ ? PriorFiles(experiment_.prior) : Files(), subject_.inputs);
+  Append(prior_ ? PriorFiles(experiment_.prior) : InputPaths(), subject_.inputs);
 }
 
 void FaceJob::MakeSubjectsFace() {

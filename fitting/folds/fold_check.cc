@@ -22,7 +22,7 @@ constexpr std::size_t kMostMeans = 2000;
 constexpr double kLeastArea = 1.0 / 40;
 
 // A sample and the 16 others that are nearest on the map, and in space.
-struct Neighbourhood {
+struct PointNeighbourhood {
   NearestSamples on_map{}, in_space{};
   double spacing_mm = kNaN;  // distance of the 4th in space
 };
@@ -34,17 +34,17 @@ class Prober {
       : period_mm_(period_mm), samples_(std::move(samples)), most_probes_(most_probes) {}
 
   MapFaults Run() const {
-    const std::vector<Neighbourhood> probes = Probes();
+    const std::vector<PointNeighbourhood> probes = Probes();
     if (probes.size() < kFewestSamples) {
       return {};
     }
     std::vector<double> spacings_mm;
-    for (const Neighbourhood& probe : probes) {
+    for (const PointNeighbourhood& probe : probes) {
       spacings_mm.push_back(probe.spacing_mm);
     }
     const double usual_mm = UpperMedian(spacings_mm);
     int folded = 0, collapsed = 0;
-    for (const Neighbourhood& probe : probes) {
+    for (const PointNeighbourhood& probe : probes) {
       const bool mixes = IsFolded(probe, std::max(usual_mm, probe.spacing_mm));
       folded += mixes ? 1 : 0;
       collapsed += !mixes && IsCollapsed(probe) ? 1 : 0;
@@ -57,12 +57,12 @@ class Prober {
   std::uint32_t Count() const { return static_cast<std::uint32_t>(samples_.size()); }
 
   // The neighbourhoods of the probed samples that lie on a sheet.
-  std::vector<Neighbourhood> Probes() const {
+  std::vector<PointNeighbourhood> Probes() const {
     const std::size_t every = (samples_.size() + most_probes_ - 1) / most_probes_;
-    std::vector<Neighbourhood> probes;
+    std::vector<PointNeighbourhood> probes;
     for (std::size_t k = 0; Count() >= kFewestSamples && k < samples_.size(); k += every) {
       const auto own = static_cast<std::uint32_t>(k);
-      Neighbourhood probe{.in_space = NearestInSpace(samples_, own)};
+      PointNeighbourhood probe{.in_space = NearestInSpace(samples_, own)};
       if (PlaneAround(samples_, probe.in_space).is_sheet) {
         probe.on_map = NearestBy(Count(), own, [&](std::uint32_t n) {
           return Way(samples_[own].at, samples_[n].at, period_mm_).squaredNorm();
@@ -76,7 +76,7 @@ class Prober {
 
   // Compares the second moments of the nearest samples on the map and in space. Samples on one scan
   // line, with noise across it, do not decide.
-  bool IsCollapsed(const Neighbourhood& probe) const {
+  bool IsCollapsed(const PointNeighbourhood& probe) const {
     // Least product of two variances over the square of their sum, for samples that spread over an
     // area. A line whose width is a third of its length has 0.09.
     constexpr double kOnLine = 0.08;
@@ -97,7 +97,7 @@ class Prober {
 
   // Groups the samples of a neighbourhood that are connected in space by links up to link_mm long.
   // Group 0 is that of the sample itself.
-  std::array<int, kNearWithItself> ClustersOf(const Neighbourhood& probe, double link_mm) const {
+  std::array<int, kNearWithItself> ClustersOf(const PointNeighbourhood& probe, double link_mm) const {
     std::array<int, kNearWithItself> cluster;
     cluster.fill(-1);
     int count = 0;
@@ -122,11 +122,11 @@ class Prober {
     return cluster;
   }
 
-  const Vec3& PositionOf(const Neighbourhood& probe, int n) const {
+  const Vec3& PositionOf(const PointNeighbourhood& probe, int n) const {
     return samples_[probe.on_map[n]].position;
   }
 
-  bool IsFolded(const Neighbourhood& probe, double spacing_mm) const {
+  bool IsFolded(const PointNeighbourhood& probe, double spacing_mm) const {
     // Links up to three spacings connect samples of one sheet across holes and noise; sheets that
     // lie closer together are not told apart.
     constexpr double kLink = 3;
@@ -142,7 +142,7 @@ class Prober {
   }
 
   // Returns whether at least three samples and two thirds of a cluster lie on sheets.
-  bool IsSheet(const Neighbourhood& probe, const std::array<int, kNearWithItself>& cluster,
+  bool IsSheet(const PointNeighbourhood& probe, const std::array<int, kNearWithItself>& cluster,
                int which) const {
     constexpr int kFewest = 3;
     int count = 0, on_sheet = 0;
@@ -158,7 +158,7 @@ class Prober {
 
   // Returns whether the map mixes a cluster with that of the sample, instead of putting them side
   // by side.
-  bool AreMixed(const Neighbourhood& probe, const std::array<int, kNearWithItself>& cluster,
+  bool AreMixed(const PointNeighbourhood& probe, const std::array<int, kNearWithItself>& cluster,
                 int other) const {
     // Two clusters side by side have their means about one sum of radii apart, mixed ones none.
     constexpr double kApart = 0.5;

@@ -54,7 +54,7 @@ Polynomial MakePolynomial(const PatchId& patch, const PatchMatrix& vertices) {
 // A point whose loss halves its weight, or more, is an outlier and must not cause refinement.
 constexpr double kOutlierFactor = 0.5;
 
-inline double Factor(const double* factors, std::size_t k) {
+inline double FactorMoments(const double* factors, std::size_t k) {
   return factors == nullptr ? 1 : factors[k];
 }
 
@@ -139,7 +139,7 @@ SEMBLANCE_WIDE_256 void AccumulateByVertex(const Batch& batch, const PatchId& pa
     const Vec4 e = values - (v[0] * Along(u, vertex) + v[1] * Along(u, vertex + 4) +
                              v[2] * Along(u, vertex + 8) + v[3] * Along(u, vertex + 12));
     const Vec4 ee = e * e;
-    const double square = ee[0] + ee[1] + ee[2], factor = Factor(batch.factors, k);
+    const double square = ee[0] + ee[1] + ee[2], factor = FactorMoments(batch.factors, k);
     sums.squares += p.weight() * factor * square;
     sums.largest = factor >= kOutlierFactor && square > sums.largest ? square : sums.largest;
     if (batch.squares != nullptr) {
@@ -213,7 +213,7 @@ Matrix16 GramOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
   Matrix16 gram = Matrix16::Zero();
   for (std::size_t k = 0; k < points.size(); ++k) {
     const VertexWeights weights = WeightsAt(points[k], patch);
-    gram.noalias() += points[k].weight() * Factor(factors, k) * weights * weights.transpose();
+    gram.noalias() += points[k].weight() * FactorMoments(factors, k) * weights * weights.transpose();
   }
   return gram;
 }

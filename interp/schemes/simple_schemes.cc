@@ -68,7 +68,7 @@ DepthValue WeightedMean(const std::vector<DepthSample>& samples, double power, c
   return {depth / sum, sd / sum};
 }
 
-struct Sums {
+struct WeightedSums {
   double weight = 0, depth = 0, sd = 0;
   bool at_base = false;
 
@@ -88,9 +88,9 @@ struct Sums {
   }
 };
 
-std::vector<Sums> SumsAlong(const DepthInput& input, const std::vector<DepthSample>& samples,
+std::vector<WeightedSums> SumsAlong(const DepthInput& input, const std::vector<DepthSample>& samples,
                             double power, const RunContext& run) {
-  std::vector<Sums> sums(input.skull.points.size());
+  std::vector<WeightedSums> sums(input.skull.points.size());
   ForEachGeodesic(InverseDistance::kName, input.skull, samples, run,
                   [&](std::size_t k, const std::vector<double>& distance) {
                     ForEachVertex(input, run, [&](std::size_t i) {
@@ -147,7 +147,7 @@ DepthField InterpolateDepth(const InverseDistance& options, const DepthInput& in
   const std::vector<DepthSample> samples = DepthSamples(input.dowels);
   const DepthLimits limits(samples, true);
   if (options.distance == DowelDistance::kGeodesic) {
-    const std::vector<Sums> sums = SumsAlong(input, samples, options.power, run);
+    const std::vector<WeightedSums> sums = SumsAlong(input, samples, options.power, run);
     return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
       return DepthValue{limits(sums[i].depth / sums[i].weight), sums[i].sd / sums[i].weight};
     });

@@ -30,9 +30,9 @@ namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
-using Lines = std::vector<std::string>;
+using TextLines = std::vector<std::string>;
 
-void AddNew(const std::string& line, Lines& lines) {
+void AddNew(const std::string& line, TextLines& lines) {
   if (std::ranges::find(lines, line) == lines.end()) {
     lines.push_back(line);
   }
@@ -102,7 +102,7 @@ void CheckDepthCoverage(const Experiment& experiment, const LandmarkFile& landma
   for (const Landmark& landmark : landmarks.landmarks) {
     dowels.push_back(Dowel{.site = landmark.site});
   }
-  Lines lost;
+  TextLines lost;
   const std::vector<Dowel> all = dowels;
   const TissueOptions tissue = WithSiteDepths(experiment, landmarks);
   FillDepths(tissue, landmarks, dowels);
@@ -136,7 +136,7 @@ void CheckMap(const DepthMap& map) {
 }
 
 // The notes of a run on rules that do not apply.
-Lines ExplainUnusedRules(const Experiment& experiment, const Case& subject, StageCache& loaded,
+TextLines ExplainUnusedRules(const Experiment& experiment, const Case& subject, StageCache& loaded,
                    const RunContext& context) {
   std::shared_ptr<const LoadedPrior> prior;
   if (UsesPrior(WayToFace(experiment))) {

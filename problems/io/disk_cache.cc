@@ -83,12 +83,12 @@ void DiskCache::Put(const std::string& key, std::string_view bytes) const {
 }
 
 void DiskCache::Trim() const {
-  struct Kept {
+  struct KeptFile {
     fs::file_time_type used;
     fs::path path;
     std::uintmax_t size;
   };
-  std::vector<Kept> files;
+  std::vector<KeptFile> files;
   std::uintmax_t total = 0;
   std::error_code error;  // files may vanish at any time, because other processes trim too
   for (fs::directory_iterator at(folder_, error), end; !error && at != end; at.increment(error)) {
@@ -100,10 +100,10 @@ void DiskCache::Trim() const {
       total += size;
     }
   }
-  std::sort(files.begin(), files.end(), [](const Kept& a, const Kept& b) {
+  std::sort(files.begin(), files.end(), [](const KeptFile& a, const KeptFile& b) {
     return std::tie(a.used, a.path) < std::tie(b.used, b.path);
   });
-  for (const Kept& file : files) {
+  for (const KeptFile& file : files) {
     if (total <= limit_bytes_) {
       return;
     }

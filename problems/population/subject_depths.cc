@@ -132,13 +132,13 @@ double ConfidenceFromWord(Certainty certainty) {
   return kByWord.at(static_cast<std::size_t>(certainty));
 }
 
-struct Marked {
+struct MarkedDepths {
   LandmarkFile file;
   std::map<std::string, double> confidence;
   std::vector<SiteDepth> dropped;  // sites that get no depth
 };
 
-Marked Propose(const SubjectData& data, const std::string& name,
+MarkedDepths Propose(const SubjectData& data, const std::string& name,
                std::span<const ReferenceHead> references, const RunContext& context) {
   if (references.empty()) {
     throw InputError(
@@ -151,15 +151,15 @@ Marked Propose(const SubjectData& data, const std::string& name,
     throw InputError(
         fmt::format("its skull seems to be in {0}; write `axes: {0}` there", proposal.axes));
   }
-  Marked marked{ProposalFile(proposal, name), {}, {}};
+  MarkedDepths marked{ProposalFile(proposal, name), {}, {}};
   for (const ProposedSite& site : proposal.sites) {
     marked.confidence[site.site] = site.confidence;
   }
   return marked;
 }
 
-Marked AsRead(LandmarkFile file) {
-  Marked marked{std::move(file), {}, {}};
+MarkedDepths AsRead(LandmarkFile file) {
+  MarkedDepths marked{std::move(file), {}, {}};
   for (const Landmark& landmark : marked.file.landmarks) {
     marked.confidence[landmark.site] =
         marked.file.proposed ? ConfidenceFromWord(landmark.certainty) : 1;
@@ -178,7 +178,7 @@ Box3 Extent(const std::vector<Landmark>& landmarks) {
 // Keeps, of several proposed landmarks with the same point, the one with the highest confidence.
 // For landmarks of a person this would be an error; a proposal contains no person's mistake, and
 // its other sites remain valid.
-void DropSamePoints(Marked& marked) {
+void DropSamePoints(MarkedDepths& marked) {
   const double same_mm = SamePoint_mm(Extent(marked.file.landmarks));
   std::vector<Landmark> by_confidence = marked.file.landmarks, kept;
   std::ranges::stable_sort(by_confidence, std::ranges::greater{},
@@ -238,7 +238,7 @@ TruthMap MeasureDepths(const std::vector<Vec3>& points, const std::vector<Vec3>&
                    MeasureDepthTruth(bases, directions, skin, options.depth_truth, context));
 }
 
-std::vector<SiteDepth> DepthsAtSites(const PopulationSubject& subject, const Marked& marked,
+std::vector<SiteDepth> DepthsAtSites(const PopulationSubject& subject, const MarkedDepths& marked,
                                      const std::vector<Dowel>& dowels, const TriMesh& skin,
                                      const MeasureOptions& options, const RunContext& context) {
   std::vector<Vec3> points, directions;
@@ -316,7 +316,7 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
     throw InputError("it has no skin; a depth needs one");
   }
   const bool open = data.landmarks.landmarks.empty();
-  Marked marked =
+  MarkedDepths marked =
       open ? Propose(data, subject.name, references, context) : AsRead(std::move(data.landmarks));
   if (marked.file.proposed) {
     DropSamePoints(marked);

@@ -407,7 +407,7 @@ ReportSection RulesSection(const Json& rules) {
 }
 
 // The faults of the result, then its notes.
-std::vector<std::string> Notes(const Json& result) {
+std::vector<std::string> RunNotes(const Json& result) {
   std::vector<std::string> notes = FaultNotes(result.value("faults", std::vector<std::string>()));
   for (const Json& note : result.at("notes")) {
     notes.push_back(note.get<std::string>());
@@ -498,7 +498,7 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
   report.title = result.at("title").get<std::string>();
   report.subtitle = "Facial approximation of " + result.at("subject").get<std::string>() +
                     ". An approximation, not an identification.";
-  report.notes = Notes(result);
+  report.notes = RunNotes(result);
   report.tiles = Tiles(result);
   report.score_heading = result.at("face").is_null() ? "In figures" : "Score";
   report.score_images = ScoreImages(result.at("face"), folder);

@@ -34,12 +34,12 @@ constexpr AverageLandmark kAverageSkull[] = {
 Vec3 Mirrored(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
 
 // The points of the same sites on the average skull and on the subject.
-struct Pairs {
+struct SitePairs {
   std::vector<Vec3> average, skull;
 };
 
-Pairs MakePairs(std::span<const SitePoint> sites, Handedness hand) {
-  Pairs pairs;
+SitePairs MakePairs(std::span<const SitePoint> sites, Handedness hand) {
+  SitePairs pairs;
   for (const SitePoint& s : sites) {
     const Vec3 average = AverageSite(s.site);
     pairs.average.push_back(hand == Handedness::kMirrored ? Mirrored(average) : average);
@@ -48,7 +48,7 @@ Pairs MakePairs(std::span<const SitePoint> sites, Handedness hand) {
   return pairs;
 }
 
-std::vector<double> Residuals(const Pairs& pairs, const Similarity& skull_from_average) {
+std::vector<double> Residuals(const SitePairs& pairs, const Similarity& skull_from_average) {
   std::vector<double> residuals;
   for (std::size_t k = 0; k < pairs.skull.size(); ++k) {
     residuals.push_back((skull_from_average * pairs.average[k] - pairs.skull[k]).norm() /
@@ -64,7 +64,7 @@ bool Spans(const Vec3& a, const Vec3& b, const Vec3& c) {
          1e-6 * std::max((b - a).squaredNorm(), (c - a).squaredNorm());
 }
 
-bool SpansABroadTriangle(const Pairs& pairs, const std::array<std::size_t, 3>& t) {
+bool SpansABroadTriangle(const SitePairs& pairs, const std::array<std::size_t, 3>& t) {
   // Twice the area of a right triangle with legs of 20 mm. Smaller triangles determine the rotation
   // too poorly to start from.
   constexpr double kMinDoubleArea_mm2 = 400;
@@ -73,13 +73,13 @@ bool SpansABroadTriangle(const Pairs& pairs, const std::array<std::size_t, 3>& t
          Spans(pairs.skull[t[0]], pairs.skull[t[1]], pairs.skull[t[2]]);
 }
 
-Similarity PoseFromTriple(const Pairs& pairs, const std::array<std::size_t, 3>& t) {
+Similarity PoseFromTriple(const SitePairs& pairs, const std::array<std::size_t, 3>& t) {
   const std::array average = {pairs.average[t[0]], pairs.average[t[1]], pairs.average[t[2]]};
   const std::array skull = {pairs.skull[t[0]], pairs.skull[t[1]], pairs.skull[t[2]]};
   return PlaceTemplate(average, skull);
 }
 
-Similarity LeastMedianPose(const Pairs& pairs) {
+Similarity LeastMedianPose(const SitePairs& pairs) {
   Similarity best;
   double least = std::numeric_limits<double>::infinity();
   const std::size_t n = pairs.skull.size();
@@ -110,7 +110,7 @@ Similarity LeastMedianPose(const Pairs& pairs) {
 
 // Iteratively reweighted least squares with the Cauchy loss. Its width of 8 mm is how far the three
 // measured skulls differ from each other: larger residuals are rather mistakes than anatomy.
-Similarity RefineByReweighting(const Pairs& pairs, Similarity pose) {
+Similarity RefineByReweighting(const SitePairs& pairs, Similarity pose) {
   constexpr double kWidth_mm = 8, kCostTolerance = 1e-9;
   constexpr int kMaxSteps = 500;
   double last = std::numeric_limits<double>::infinity();
@@ -148,7 +148,7 @@ Vec3 SkullFit::Predicted(std::string_view site) const {
 }
 
 SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand) {
-  const Pairs pairs = MakePairs(sites, hand);
+  const SitePairs pairs = MakePairs(sites, hand);
   SkullFit fit;
   fit.mirrored = hand == Handedness::kMirrored;
   fit.skull_from_average = RefineByReweighting(pairs, LeastMedianPose(pairs));

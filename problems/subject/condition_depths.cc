@@ -31,7 +31,7 @@ double CorrelationBetween(const SiteCorrelation& o, const std::string& a, const 
          rest * std::exp(-(p - q).norm() / o.length_mm);
 }
 
-using Notes = std::vector<std::string>;
+using ConditionNotes = std::vector<std::string>;
 
 constexpr double kMinDepth_mm = 0.5;
 // Distance from the mean, in sds, beyond which a note warns: no subject of a table is so far out.
@@ -97,7 +97,7 @@ JointNormal ReadDistribution(const TissueOptions& options) {
 // The known values that the distribution can use. A known site may be unknown to the table, which
 // gives a note; an unknown covariate is an error.
 std::vector<KnownValue> UsableValues(const TissueGiven& given, const JointNormal& joint,
-                                     const std::map<std::string, double>& depths, Notes& notes) {
+                                     const std::map<std::string, double>& depths, ConditionNotes& notes) {
   std::vector<KnownValue> known;
   std::vector<std::string> unused;
   for (const auto& [site, depth_mm] : depths) {
@@ -123,7 +123,7 @@ std::vector<KnownValue> UsableValues(const TissueGiven& given, const JointNormal
 }
 
 // Notes known values that are far from those of all subjects of the table.
-void NoteFarValues(const JointNormal& joint, const std::vector<KnownValue>& known, Notes& notes) {
+void NoteFarValues(const JointNormal& joint, const std::vector<KnownValue>& known, ConditionNotes& notes) {
   for (const KnownValue& value : known) {
     const int at = *joint.Find(value.name);
     const double mean = joint.mean[at], sd = joint.sd[at];
@@ -216,7 +216,7 @@ JointNormal MakeTableDistribution(const TissueTable& table, Sex sex, Build build
 
 std::vector<std::string> ConditionDepths(const TissueOptions& options,
                                          const LandmarkFile& landmarks, std::span<Dowel> dowels) {
-  Notes notes;
+  ConditionNotes notes;
   if (!IsConditioned(options)) {
     return notes;
   }

@@ -17,10 +17,10 @@ namespace semblance::problems {
 namespace {
 
 // Notes for people, of which only those about certain sites are kept.
-class Notes {
+class FillNotes {
  public:
-  Notes() = default;  // keeps notes about all sites
-  explicit Notes(std::set<std::string> sites) : sites_(std::move(sites)) {}
+  FillNotes() = default;  // keeps notes about all sites
+  explicit FillNotes(std::set<std::string> sites) : sites_(std::move(sites)) {}
 
   bool Concern(const std::string& site) const { return !sites_ || sites_->contains(site); }
   void Add(std::string line) { lines_.push_back(std::move(line)); }
@@ -62,7 +62,7 @@ std::map<std::string, double>::const_iterator FindSet(const TissueOptions& optio
   return own != options.set_mm.end() ? own : options.set_mm.find(WithoutSide(site));
 }
 
-void NoteUnusedSets(const TissueOptions& options, const std::vector<Dowel>& dowels, Notes& notes) {
+void NoteUnusedSets(const TissueOptions& options, const std::vector<Dowel>& dowels, FillNotes& notes) {
   for (const auto& entry : options.set_mm) {
     const bool used = std::any_of(dowels.begin(), dowels.end(), [&](const Dowel& dowel) {
       const auto it = FindSet(options, dowel.site);
@@ -77,7 +77,7 @@ void NoteUnusedSets(const TissueOptions& options, const std::vector<Dowel>& dowe
 
 // Sets the depths of set_mm and returns the dowels that still need one.
 std::vector<Dowel*> ApplySets(const TissueOptions& options, std::vector<Dowel>& dowels,
-                              Notes& notes) {
+                              FillNotes& notes) {
   std::vector<Dowel*> open;
   for (Dowel& dowel : dowels) {
     dowel.depth_mm = dowel.sd_mm = kNaN;
@@ -94,7 +94,7 @@ std::vector<Dowel*> ApplySets(const TissueOptions& options, std::vector<Dowel>& 
 }
 
 void NoteUnorderedRows(const TissueTable& table, Sex sex, std::span<const std::string> sites,
-                       Notes& notes) {
+                       FillNotes& notes) {
   const std::vector<std::string> landmarks = UnorderedLandmarks(table, sex, sites);
   if (!landmarks.empty()) {
     notes.Add(fmt::format(
@@ -105,7 +105,7 @@ void NoteUnorderedRows(const TissueTable& table, Sex sex, std::span<const std::s
 }
 
 void SetDepth(const TissueTable& table, const TissueDepth& depth, double sds, Dowel& dowel,
-              Notes& notes) {
+              FillNotes& notes) {
   constexpr double kMinDepth_mm = 0.5;  // a depth of 0 or less would put skin inside bone
   dowel.depth_mm = depth.mean_mm;
   dowel.sd_mm = depth.sd_mm.value_or(kNaN);
@@ -121,7 +121,7 @@ void SetDepth(const TissueTable& table, const TissueDepth& depth, double sds, Do
 
 // Sets the depths that the table has and returns the dowels that still need one.
 std::vector<Dowel*> ApplyTable(const TissueOptions& options, const TissueTable& table,
-                               const std::vector<Dowel*>& open, Notes& notes) {
+                               const std::vector<Dowel*>& open, FillNotes& notes) {
   std::vector<Dowel*> left;
   std::vector<std::string> sites, without_sd;
   for (Dowel* dowel : open) {
@@ -149,7 +149,7 @@ std::vector<Dowel*> ApplyTable(const TissueOptions& options, const TissueTable& 
 }
 
 void NoteFilled(const TissueTable& lacking, const TissueTable& filling,
-                const std::vector<Dowel*>& open, Notes& notes) {
+                const std::vector<Dowel*>& open, FillNotes& notes) {
   std::vector<std::string> sites;
   for (const Dowel* dowel : open) {
     if (!std::isnan(dowel->depth_mm) && notes.Concern(dowel->site)) {
@@ -163,7 +163,7 @@ void NoteFilled(const TissueTable& lacking, const TissueTable& filling,
 }
 
 void NoteLeftOut(const TissueOptions& options, const TissueTable& table,
-                 const std::vector<Dowel*>& left, Notes& notes) {
+                 const std::vector<Dowel*>& left, FillNotes& notes) {
   for (const Dowel* dowel : left) {
     notes.Add(
         dowel->site,
@@ -176,7 +176,7 @@ void NoteLeftOut(const TissueOptions& options, const TissueTable& table,
 
 // Sets the depths that no table has but `given` has; returns the dowels that still need one.
 std::vector<Dowel*> ApplyKnown(const TissueOptions& options, const LandmarkFile& landmarks,
-                               const std::vector<Dowel*>& open, Notes& notes) {
+                               const std::vector<Dowel*>& open, FillNotes& notes) {
   const std::map<std::string, double> known = KnownDepths(options.given, landmarks);
   std::vector<Dowel*> left;
   for (Dowel* dowel : open) {
@@ -195,7 +195,7 @@ std::vector<Dowel*> ApplyKnown(const TissueOptions& options, const LandmarkFile&
 }
 
 void FillFromTable(const TissueOptions& options, const LandmarkFile& landmarks,
-                   const std::vector<Dowel*>& open, Notes& notes) {
+                   const std::vector<Dowel*>& open, FillNotes& notes) {
   if (open.empty()) {
     return;
   }
@@ -223,7 +223,7 @@ const Landmark& LandmarkAt(const LandmarkFile& file, const std::string& site) {
       fmt::format("site {}: it has no landmark, so it has no measured depth", DescribeSite(site)));
 }
 
-void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open, Notes& notes) {
+void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open, FillNotes& notes) {
   for (Dowel* dowel : open) {
     const Landmark& landmark = LandmarkAt(file, dowel->site);
     if (landmark.depth_along_normal_mm) {
@@ -296,7 +296,7 @@ void AddMeasured(const std::string& code, const LandmarkFile& file,
 
 // Sets the depth of each dowel, or NaN if its site has none.
 void SetDepths(const TissueOptions& options, const LandmarkFile& landmarks,
-               std::vector<Dowel>& dowels, Notes& notes) {
+               std::vector<Dowel>& dowels, FillNotes& notes) {
   CheckSetSites(options.set_mm);
   const std::vector<Dowel*> open = ApplySets(options, dowels, notes);
   NoteUnusedSets(options, dowels, notes);
@@ -307,7 +307,7 @@ void SetDepths(const TissueOptions& options, const LandmarkFile& landmarks,
   }
 }
 
-void EraseWithoutDepth(const Notes& notes, std::vector<Dowel>& dowels) {
+void EraseWithoutDepth(const FillNotes& notes, std::vector<Dowel>& dowels) {
   std::erase_if(dowels, [](const Dowel& dowel) { return std::isnan(dowel.depth_mm); });
   if (dowels.empty()) {
     throw InputError(
@@ -347,7 +347,7 @@ std::map<std::string, double> KnownDepths(const TissueGiven& given, const Landma
 
 std::vector<std::string> FillDepths(const TissueOptions& options, const LandmarkFile& landmarks,
                                     std::vector<Dowel>& dowels) {
-  Notes notes;
+  FillNotes notes;
   SetDepths(options, landmarks, dowels, notes);
   EraseWithoutDepth(notes, dowels);
   return notes.Lines();
@@ -359,7 +359,7 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
   for (const Dowel& dowel : used) {
     sites.insert(dowel.site);
   }
-  Notes notes(std::move(sites));
+  FillNotes notes(std::move(sites));
   SetDepths(options, landmarks, all, notes);
   for (Dowel& dowel : used) {
     const auto same = std::ranges::find(all, dowel.site, &Dowel::site);

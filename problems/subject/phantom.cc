@@ -21,13 +21,13 @@ namespace semblance::problems {
 namespace {
 
 // Bone and tissue of an average head at a landmark; the left one of a pair.
-struct AverageLandmark {
+struct PhantomLandmark {
   std::string_view code;  // Site::landmark
   Vec3 near_bone;         // mm; the ray from the centre through it meets the landmark
   double depth_mm;        // tissue depth of an average adult
 };
 
-const AverageLandmark kAverageHead[] = {
+const PhantomLandmark kAverageHead[] = {
     {"sg", {0, 2, 32}, 4.3},    {"g", {0, -3, 11}, 5.3},     {"n", {0, 0, 0}, 6.5},
     {"rhi", {0, -10, -21}, 4},  {"mp", {0, -5, -58}, 10},    {"pr", {0, -8, -69}, 10},
     {"id", {0, -5, -86}, 11},   {"sm", {0, -1, -96}, 11},    {"pg", {0, -4, -107}, 11},
@@ -56,8 +56,8 @@ class DepthFormula {
   WaveSum waves_;
 };
 
-const AverageLandmark& AverageAt(const Site& site) {
-  const auto* const found = std::ranges::find(kAverageHead, site.landmark, &AverageLandmark::code);
+const PhantomLandmark& AverageAt(const Site& site) {
+  const auto* const found = std::ranges::find(kAverageHead, site.landmark, &PhantomLandmark::code);
   assert(found != std::end(kAverageHead));
   return *found;
 }

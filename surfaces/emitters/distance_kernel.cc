@@ -12,14 +12,14 @@ namespace {
 
 // A point relative to the lanes from `first` on.
 template <class N>
-struct Seen {
+struct SeenTriangle {
   N z{};        // height over the plane of emission
   N beside2{};  // squared distance within the plane to the triangle's border
   N within{};   // >= 0 if the foot lies in the triangle
 };
 
 template <class N>
-SEMBLANCE_INLINE Seen<N> See(const DistanceEmitterLanes& b, int first, const Vec3& p) {
+SEMBLANCE_INLINE SeenTriangle<N> See(const DistanceEmitterLanes& b, int first, const Vec3& p) {
   const auto load = [first](const DistanceEmitterLanes::Lanes& lanes) {
     return Load<N>(lanes, first);
   };
@@ -44,7 +44,7 @@ SEMBLANCE_INLINE Seen<N> See(const DistanceEmitterLanes& b, int first, const Vec
 template <class N>
 SEMBLANCE_INLINE N Emit(const DistanceEmitterLanes& b, int first, const Vec3& p,
                         const Falloff& falloff, int whole) {
-  const Seen<N> seen = See<N>(b, first, p);
+  const SeenTriangle<N> seen = See<N>(b, first, p);
   const N nothing{}, most = All<N>(kMaxEmission);
   const N beside2 = seen.within >= 0 ? nothing : seen.beside2;
   const N square = Greater<N>(seen.z * seen.z + beside2, Load<N>(b.floor_mm2, first));

@@ -14,7 +14,7 @@
 namespace semblance::problems {
 namespace {
 
-using Cell = std::array<int, 3>;
+using GridCell = std::array<int, 3>;
 
 // The places that the ball's centre can reach: cells of a box, represented by their middles.
 class ProbeGrid {
@@ -45,14 +45,14 @@ class ProbeGrid {
 
   // Moves the ball in from all free faces of the box.
   void Flood() {
-    std::vector<Cell> open;
-    ForFaces([&](const Cell& c) { Enter(c, open); });
+    std::vector<GridCell> open;
+    ForFaces([&](const GridCell& c) { Enter(c, open); });
     while (!open.empty()) {
-      const Cell c = open.back();
+      const GridCell c = open.back();
       open.pop_back();
       for (int axis = 0; axis < 3; ++axis) {
         for (const int step : {-1, 1}) {
-          Cell next = c;
+          GridCell next = c;
           next[axis] += step;
           if (next[axis] >= 0 && next[axis] < size_[axis]) {
             Enter(next, open);
@@ -81,13 +81,13 @@ class ProbeGrid {
   enum State : std::uint8_t { kFree, kBarred, kReached };
   static constexpr int kCellsPerProbe = 6;
 
-  std::size_t IndexOf(const Cell& c) const {
+  std::size_t IndexOf(const GridCell& c) const {
     return (std::size_t(c[2]) * size_[1] + c[1]) * size_[0] + c[0];
   }
-  Vec3 Middle(const Cell& c) const {
+  Vec3 Middle(const GridCell& c) const {
     return origin_ + cell_mm_ * Vec3(c[0] + 0.5, c[1] + 0.5, c[2] + 0.5);
   }
-  void Enter(const Cell& c, std::vector<Cell>& open) {
+  void Enter(const GridCell& c, std::vector<GridCell>& open) {
     std::uint8_t& state = state_[IndexOf(c)];
     if (state == kFree) {
       state = kReached;
@@ -95,7 +95,7 @@ class ProbeGrid {
     }
   }
   void CloseBeyond(const CutPlane& end) {
-    ForCells({0, 0, 0}, {size_[0] - 1, size_[1] - 1, size_[2] - 1}, [&](const Cell& c) {
+    ForCells({0, 0, 0}, {size_[0] - 1, size_[1] - 1, size_[2] - 1}, [&](const GridCell& c) {
       if (end.Beyond_mm(Middle(c)) > 0) {
         state_[IndexOf(c)] = kBarred;
       }
@@ -105,11 +105,11 @@ class ProbeGrid {
 
   // Calls visit(cell) from first to last, x fastest, until it returns true. Returns whether it did.
   template <class Visit>
-  static bool ForCells(const Cell& first, const Cell& last, const Visit& visit) {
+  static bool ForCells(const GridCell& first, const GridCell& last, const Visit& visit) {
     for (int z = first[2]; z <= last[2]; ++z) {
       for (int y = first[1]; y <= last[1]; ++y) {
         for (int x = first[0]; x <= last[0]; ++x) {
-          if (visit(Cell{x, y, z})) {
+          if (visit(GridCell{x, y, z})) {
             return true;
           }
         }
@@ -145,9 +145,9 @@ class ProbeGrid {
   void ForFaces(const Visit& visit) const {
     for (int axis = 0; axis < 3; ++axis) {
       for (const int at : {0, size_[axis] - 1}) {
-        Cell first = {0, 0, 0}, last = {size_[0] - 1, size_[1] - 1, size_[2] - 1};
+        GridCell first = {0, 0, 0}, last = {size_[0] - 1, size_[1] - 1, size_[2] - 1};
         first[axis] = last[axis] = at;
-        ForCells(first, last, [&](const Cell& c) {
+        ForCells(first, last, [&](const GridCell& c) {
           visit(c);
           return false;
         });
@@ -157,7 +157,7 @@ class ProbeGrid {
 
   double probe_mm_, cell_mm_;
   Vec3 origin_;
-  Cell size_ = {0, 0, 0};
+  GridCell size_ = {0, 0, 0};
   std::vector<std::uint8_t> state_;
 };
 

@@ -75,10 +75,10 @@ void ClosePocket(const Loop& rim, TriMesh& mesh) {
 }
 
 // One row per point: the weights of its neighbours, by point.
-using Rows = std::vector<std::map<std::int32_t, double>>;
+using GridRows = std::vector<std::map<std::int32_t, double>>;
 
-Rows MeanValueWeights(const TriMesh& mesh) {
-  Rows rows(mesh.points.size());
+GridRows MeanValueWeights(const TriMesh& mesh) {
+  GridRows rows(mesh.points.size());
   for (const Triangle& t : mesh.triangles) {
     for (int c = 0; c < 3; ++c) {
       const std::int32_t i = t[c], j = t[(c + 1) % 3], k = t[(c + 2) % 3];
@@ -273,7 +273,7 @@ class Layout {
 
   const TriMesh& mesh_;
   const Loop& neck_;
-  Rows rows_;
+  GridRows rows_;
   Vec3 axis_ = Vec3::Zero();
   std::vector<double> turn_;  // azimuth about the axis, in turns
   int crown_ = -1;
@@ -304,11 +304,11 @@ HeadDomain LayOutHead(const TriMesh& head, const std::string& name) {
 
 namespace {
 
-struct Corner {
+struct DomainCorner {
   Vec3 point, normal;
   Vec2 uv;
 };
-using Corners = std::array<Corner, 3>;
+using Corners = std::array<DomainCorner, 3>;
 
 Vec3 PnPoint(const Corners& c, double w0, double w1, double w2) {
   const auto along = [&](int i, int j) -> Vec3 {  // a third of the way from i to j
@@ -395,9 +395,9 @@ HeadSamples SampleHead(const HeadDomain& head, int columns, int rows) {
       continue;
     }
     // The crown is a whole side of the domain, so a triangle at the crown is a quad in the domain.
-    const Corner& a = c[(crown + 1) % 3];
-    const Corner& b = c[(crown + 2) % 3];
-    Corner over_a = c[crown], over_b = c[crown];
+    const DomainCorner& a = c[(crown + 1) % 3];
+    const DomainCorner& b = c[(crown + 2) % 3];
+    DomainCorner over_a = c[crown], over_b = c[crown];
     over_a.uv = {a.uv.x(), 1};
     over_b.uv = {b.uv.x(), 1};
     sampler.Add({a, b, over_b});

@@ -257,10 +257,10 @@ StudyComparison CompareStudies(std::span<const NamedStudy> studies, const Compar
 
 namespace {
 
-using BySubject = std::map<std::string, double>;
+using ValuesBySubject = std::map<std::string, double>;
 
-std::map<std::string, BySubject> ByLabel(const NamedStudy& study, const std::string& metric) {
-  std::map<std::string, BySubject> treatments;
+std::map<std::string, ValuesBySubject> ByLabel(const NamedStudy& study, const std::string& metric) {
+  std::map<std::string, ValuesBySubject> treatments;
   for (const Treatment& treatment : Treatments(study.results, metric)) {
     if (!treatment.by_subject.empty()) {
       treatments[treatment.label] = treatment.by_subject;
@@ -275,7 +275,7 @@ struct TreatmentMeans {
 };
 
 // The means over the subjects that have all of the treatments.
-TreatmentMeans ComputeMeans(const std::map<std::string, BySubject>& treatments,
+TreatmentMeans ComputeMeans(const std::map<std::string, ValuesBySubject>& treatments,
                             const std::vector<std::string>& labels, const NamedStudy& study,
                             const Preference& preference) {
   std::map<std::string, std::size_t> have;

@@ -402,7 +402,7 @@ std::vector<ReportSection> MetricSections(const StudyResults& results,
 }
 
 // Failed and missing trials come before other notes.
-std::vector<std::string> Notes(const StudyResults& results) {
+std::vector<std::string> StudyNotes(const StudyResults& results) {
   std::vector<std::string> notes;
   const int failed = results.Count("failed"), missing = results.Count("missing");
   if (failed > 0) {
@@ -434,7 +434,7 @@ std::string StudyPage(const StudyResults& results, const std::filesystem::path& 
   report.sections = MetricSections(results, ranked, maps);
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
-  report.notes = Notes(results);
+  report.notes = StudyNotes(results);
   report.sections.push_back(TrialsSection(results, root));
   return ReportHtml(report);
 }

@@ -141,7 +141,7 @@ std::vector<ReportImage> SubjectMap(const StudyResults& results,
 namespace {
 
 // A column of a table: its head and the metric in it.
-struct Column {
+struct SectionColumn {
   std::string head, metric;
   int digits = 3;  // decimals
 };
@@ -164,7 +164,7 @@ double Identity(double x) { return x; }
 double Square(double x) { return x * x; }
 
 ReportTable MeansTable(const StudyResults& results, const std::vector<Treatment>& ranked,
-                       const std::string& caption, const std::vector<Column>& columns) {
+                       const std::string& caption, const std::vector<SectionColumn>& columns) {
   ReportTable table{caption, {"treatment"}};
   const auto is_known = [&](const std::string& metric) {
     return std::ranges::any_of(results.trials,
@@ -173,7 +173,7 @@ ReportTable MeansTable(const StudyResults& results, const std::vector<Treatment>
   for (const Treatment& treatment : ranked) {
     table.AddRow(treatment.label);
   }
-  for (const Column& column : columns) {
+  for (const SectionColumn& column : columns) {
     if (is_known(column.metric)) {
       table.header.push_back(column.head);
       for (std::size_t n = 0; n < ranked.size(); ++n) {
@@ -230,7 +230,7 @@ bool HigherIsBetter(const StudyResults& results) {
 
 ReportTable SiblingsTable(const StudyResults& results, const std::vector<Treatment>& ranked,
                           const std::string& parent) {
-  std::vector<Column> columns;
+  std::vector<SectionColumn> columns;
   if (HigherIsBetter(results)) {  // the metric is not an error, so it is not among those below
     columns.push_back({WordsOfMetric(results.metric) + Direction(results), results.metric});
   }
@@ -257,7 +257,7 @@ ReportTable SiblingsTable(const StudyResults& results, const std::vector<Treatme
 
 ReportTable RegionsTable(const StudyResults& results, const std::vector<Treatment>& ranked,
                          const std::string& parent, const std::string& leaf) {
-  std::vector<Column> columns;
+  std::vector<SectionColumn> columns;
   const std::string prefix = parent + "regions.", suffix = "." + leaf;
   for (const std::string& name : NamesBetween(results, prefix, suffix)) {
     columns.push_back({name, prefix + name + suffix});
@@ -274,7 +274,7 @@ constexpr const char* kSideScores = "cross_validation.side.scores.scheme.";
 
 ReportTable ScoresTable(const StudyResults& results, const std::vector<Treatment>& ranked,
                         const std::string& caption, const std::string& prefix) {
-  std::vector<Column> columns;
+  std::vector<SectionColumn> columns;
   for (const auto& [head, name] : std::to_array<std::pair<const char*, const char*>>(
            {{"points", "n"},
             {"MAE (mm)", "mae_mm"},
@@ -337,7 +337,7 @@ ReportTable PairedScoresTable(const StudyResults& results, const std::vector<Tre
 }
 
 ReportTable LeftOutTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  std::vector<Column> columns;
+  std::vector<SectionColumn> columns;
   for (const auto& [kind, words] : std::to_array<std::pair<const char*, const char*>>(
            {{"landmark", "a landmark"}, {"side", "a side"}, {"k_fold", "a random part"}})) {
     columns.push_back(
@@ -352,7 +352,7 @@ ReportTable LeftOutTable(const StudyResults& results, const std::vector<Treatmen
 // The weight of each scheme in treatments that average schemes.
 ReportTable SharesTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
   const std::string prefix = "depth.shares.";
-  std::vector<Column> columns;
+  std::vector<SectionColumn> columns;
   for (const std::string& name : NamesBetween(results, prefix, "")) {
     columns.push_back({name, prefix + name});
   }
@@ -413,12 +413,12 @@ std::vector<ReportTable> Subtables(const StudyResults& results,
 
 namespace {
 
-using BySubject = std::map<std::string, double>;
+using SectionBySubject = std::map<std::string, double>;
 
 // A kind of face with the rank of its own person, by subject.
 struct Probe {
   std::string label;
-  BySubject rank;
+  SectionBySubject rank;
 
   std::vector<double> Ranks() const {
     std::vector<double> ranks;
@@ -430,9 +430,9 @@ struct Probe {
 };
 
 // The metric of a treatment's trials.
-BySubject CollectMetric(const StudyResults& results, const Treatment& treatment,
+SectionBySubject CollectMetric(const StudyResults& results, const Treatment& treatment,
                         const std::string& metric) {
-  BySubject values;
+  SectionBySubject values;
   for (const std::size_t n : treatment.trials) {
     const TrialRow& row = results.trials[n];
     if (const auto it = row.metrics.find(metric); it != row.metrics.end()) {

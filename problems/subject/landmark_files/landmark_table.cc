@@ -54,13 +54,13 @@ class Columns {
   std::set<std::size_t> used_;
 };
 
-struct Layout {
+struct TableLayout {
   std::size_t site, x, y, z;
   std::array<std::optional<std::size_t>, 3> normal;
   std::optional<std::size_t> depth_along_normal, depth_closest, certainty, note;
 };
 
-Layout FindLayout(Columns& columns) {
+TableLayout FindLayout(Columns& columns) {
   return {.site = columns.Need({"site", "landmark", "label", "name"}),
           .x = columns.Need({"x", "x_mm"}),
           .y = columns.Need({"y", "y_mm"}),
@@ -73,7 +73,7 @@ Layout FindLayout(Columns& columns) {
           .note = columns.Find({"note", "description"})};
 }
 
-std::vector<std::size_t> NumberColumns(const Layout& layout) {
+std::vector<std::size_t> NumberColumns(const TableLayout& layout) {
   std::vector<std::size_t> columns = {layout.x, layout.y, layout.z};
   for (const auto& column : {layout.normal[0], layout.normal[1], layout.normal[2],
                              layout.depth_along_normal, layout.depth_closest}) {
@@ -114,7 +114,7 @@ std::optional<double> NumberAt(const CsvReader& table, std::optional<std::size_t
   return std::isnan(value) ? std::nullopt : std::optional(value);
 }
 
-std::optional<std::array<double, 3>> NormalAt(const CsvReader& table, const Layout& layout) {
+std::optional<std::array<double, 3>> NormalAt(const CsvReader& table, const TableLayout& layout) {
   std::array<std::optional<double>, 3> n;
   std::transform(layout.normal.begin(), layout.normal.end(), n.begin(),
                  [&](const auto& column) { return NumberAt(table, column); });
@@ -138,7 +138,7 @@ Certainty CertaintyAt(const CsvReader& table, std::optional<std::size_t> column)
   return static_cast<Certainty>(found - words.begin());
 }
 
-Landmark ReadRow(const CsvReader& table, const Layout& layout) {
+Landmark ReadRow(const CsvReader& table, const TableLayout& layout) {
   return {.site = std::string(table.Cell(layout.site)),
           .point = {table.Number(layout.x), table.Number(layout.y), table.Number(layout.z)},
           .normal = NormalAt(table, layout),
@@ -154,7 +154,7 @@ LandmarkFile ParseLandmarkTable(std::string_view text, std::string_view file,
                                 std::vector<std::string>& ignored) {
   CsvReader table(text, file, DetectDialect(text, file));
   Columns columns(table);
-  const Layout layout = FindLayout(columns);
+  const TableLayout layout = FindLayout(columns);
   ignored = columns.Unused();
   LandmarkFile result{.subject = "", .units = "mm", .axes = "", .landmarks = {}, .absent = {}};
   while (table.NextRow()) {

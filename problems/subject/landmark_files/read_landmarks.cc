@@ -23,9 +23,9 @@ namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
-using Notes = std::vector<std::string>;
+using ReadNotes = std::vector<std::string>;
 
-LandmarkFile ParseTable(std::string_view text, std::string_view file, Notes& notes) {
+LandmarkFile ParseTable(std::string_view text, std::string_view file, ReadNotes& notes) {
   std::vector<std::string> ignored;
   LandmarkFile result = ParseLandmarkTable(text, file, ignored);
   if (!ignored.empty()) {
@@ -37,7 +37,7 @@ LandmarkFile ParseTable(std::string_view text, std::string_view file, Notes& not
 // A file format, with its parser and its writer.
 struct Format {
   std::string_view extension;
-  LandmarkFile (*parse)(std::string_view text, std::string_view file, Notes& notes);
+  LandmarkFile (*parse)(std::string_view text, std::string_view file, ReadNotes& notes);
   std::string (*encode)(const LandmarkFile& file);
   bool holds_measurements;  // normals, depths and certainties
   bool holds_notes;
@@ -53,7 +53,7 @@ std::string CloudComparePoints(const LandmarkFile& file) {
 }
 
 template <LandmarkFile (*parse)(std::string_view, std::string_view)>
-LandmarkFile WithoutNotes(std::string_view text, std::string_view file, Notes&) {
+LandmarkFile WithoutNotes(std::string_view text, std::string_view file, ReadNotes&) {
   return parse(text, file);
 }
 
@@ -90,7 +90,7 @@ void ThrowFaults(const fs::path& path, const std::vector<std::string>& faults) {
 
 // Replaces names by codes of sites. Points without a known name are left out if that is allowed.
 template <class Entry>
-void NameSites(const ReadLandmarksOptions& options, std::vector<Entry>& entries, Notes& notes,
+void NameSites(const ReadLandmarksOptions& options, std::vector<Entry>& entries, ReadNotes& notes,
                std::vector<std::string>& faults) {
   std::vector<Entry> known;
   for (Entry& entry : entries) {
@@ -128,7 +128,7 @@ std::string_view RemedyForAxes(const Format& format) {
 }
 
 void ChooseAxes(const fs::path& path, const ReadLandmarksOptions& options, LandmarkFile& file,
-                Notes& notes) {
+                ReadNotes& notes) {
   if (file.axes.empty() && !options.axes) {
     notes.push_back(fmt::format("{}: the file does not state its axes; taken as LPS",
                                 path.filename().string()));
@@ -144,7 +144,7 @@ void ChooseAxes(const fs::path& path, const ReadLandmarksOptions& options, Landm
   }
 }
 
-void TurnToLps(const fs::path& path, LandmarkFile& file, Notes& notes) {
+void TurnToLps(const fs::path& path, LandmarkFile& file, ReadNotes& notes) {
   if (file.axes == "LPS") {
     return;
   }

@@ -26,15 +26,15 @@ namespace semblance::problems {
 namespace {
 
 // A connected part of a mesh.
-struct Body {
+struct BonePiece {
   double area_mm2 = 0;
   Box3 box;
 };
 
-std::vector<Body> MeasureBodies(const TriMesh& mesh, const Components& components) {
-  std::vector<Body> bodies(components.count);
+std::vector<BonePiece> MeasureBodies(const TriMesh& mesh, const Components& components) {
+  std::vector<BonePiece> bodies(components.count);
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    Body& body = bodies[components.of_triangle[t]];
+    BonePiece& body = bodies[components.of_triangle[t]];
     body.area_mm2 += TriangleAreaVector(mesh, mesh.triangles[t]).norm();
     body.box.extend(TriangleCentroid(mesh, mesh.triangles[t]));
   }
@@ -43,8 +43,8 @@ std::vector<Body> MeasureBodies(const TriMesh& mesh, const Components& component
 
 // Refuses a mesh with two skulls. A mandible is no second skull: it is about 0.7 times as long as
 // its cranium and has a quarter of its area, hence the limits 0.8 and 0.5.
-void CheckOneSkull(std::vector<Body> bodies, const std::string& name) {
-  std::ranges::sort(bodies, std::greater<>(), &Body::area_mm2);
+void CheckOneSkull(std::vector<BonePiece> bodies, const std::string& name) {
+  std::ranges::sort(bodies, std::greater<>(), &BonePiece::area_mm2);
   if (bodies.size() < 2) {
     return;
   }
@@ -61,7 +61,7 @@ void CheckOneSkull(std::vector<Body> bodies, const std::string& name) {
 TriMesh WithoutSpecks(const TriMesh& mesh, const std::string& name) {
   constexpr double kMinArea_mm2 = 300;
   const Components components = ConnectedComponents(mesh);
-  const std::vector<Body> bodies = MeasureBodies(mesh, components);
+  const std::vector<BonePiece> bodies = MeasureBodies(mesh, components);
   CheckOneSkull(bodies, name);
   std::vector<bool> keep(mesh.triangles.size());
   for (std::size_t t = 0; t < keep.size(); ++t) {
