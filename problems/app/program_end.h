@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the program ends early: messages and exit codes of exceptions, Ctrl-C and SIGTERM.
+// Early ends of the program: messages and exit codes of exceptions, Ctrl-C and SIGTERM.
 #pragma once
 
 #include <exception>

@@ -24,8 +24,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Of the shown skull. Landmarks are clicked on it: fewer triangles move them off the true bone,
-// more make the page slow.
+// Size of the shown skull. Landmarks are clicked on it: fewer triangles move them off the true
+// bone, more make the page slow.
 constexpr int kSkullTriangles = 60000;
 
 TriMesh ReadInMm(const fs::path& path, const FileSubject& files) {

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Python module against closed forms, and against what it reads back."""
+"""Tests the Python module against closed forms and against files that it reads back."""
 import os
 import signal
 import sys
@@ -28,7 +28,7 @@ def plane_net(rows=5, columns=6):
 
 
 def sphere(radius=50.0, rings=24):
-    """Vertices and triangles of a closed sphere, outward."""
+    """Vertices and triangles of a closed sphere, oriented outwards."""
     points, triangles = [[0, 0, radius]], []
     for i in range(1, rings):
         for j in range(2 * rings):
@@ -46,7 +46,7 @@ def sphere(radius=50.0, rings=24):
 
 
 class Surface(unittest.TestCase):
-    def test_a_plane_is_a_plane(self):
+    def test_a_flat_net_gives_a_plane(self):
         surface = semblance.HSpline(plane_net(), max_level=2)
         uv = np.random.default_rng(1).random((50, 2))
         points = surface.points(uv)
@@ -55,13 +55,13 @@ class Surface(unittest.TestCase):
         np.testing.assert_allclose(surface.derivatives(uv, 1, 0), np.tile([30, 0, 0], (50, 1)), atol=1e-10)
         np.testing.assert_allclose(surface.derivatives(uv, 0, 2), np.zeros((50, 3)), atol=1e-9)
 
-    def test_projection_finds_the_foot(self):
+    def test_projection_finds_the_closest_point(self):
         surface = semblance.HSpline(plane_net(), max_level=0)
         uv, distance = surface.project([[15.0, 5.0, -7.0]])
         np.testing.assert_allclose(uv, [[0.5, 0.25]], atol=1e-9)
         np.testing.assert_allclose(distance, [7.0], atol=1e-9)
 
-    def test_a_changed_net_is_read_back_and_finer_detail_rides_along(self):
+    def test_a_changed_net_is_read_back_and_finer_detail_moves_with_it(self):
         surface = semblance.HSpline(plane_net(), max_level=1)
         fine = surface.net(1)
         fine[4, 4, 2] += 1.0
@@ -72,7 +72,7 @@ class Surface(unittest.TestCase):
         surface.set_net(0, coarse)
         np.testing.assert_allclose(surface.net(1)[..., 2], fine[..., 2] + 5.0, atol=1e-9)
 
-    def test_a_file_gives_the_surface_to_the_bit(self):
+    def test_a_file_gives_the_identical_surface(self):
         surface = semblance.HSpline(plane_net() + 0.1, max_level=1)
         with tempfile.TemporaryDirectory() as folder:
             path = os.path.join(folder, "s.hspline.json")
@@ -88,7 +88,7 @@ class Surface(unittest.TestCase):
         self.assertEqual(triangles.shape[0], 2 * 6 * 4)
         self.assertLess(triangles.max(), len(vertices))
 
-    def test_wrong_arrays_are_told(self):
+    def test_wrong_arrays_are_reported(self):
         surface = semblance.HSpline(plane_net())
         with self.assertRaisesRegex(semblance.InputError, r"uv is 4 x 3; expected an array of n x 2"):
             surface.points(np.zeros((4, 3)))
@@ -119,7 +119,7 @@ class Fit(unittest.TestCase):
         found = semblance.fit(points, uv, patches_u=4, patches_v=4)
         np.testing.assert_array_equal(found.uv, uv)
 
-    def test_unknown_options_are_told_with_a_suggestion(self):
+    def test_unknown_options_are_reported_with_a_suggestion(self):
         with self.assertRaisesRegex(semblance.ConfigError, "patches_w.*did you mean 'patches_[uv]'"):
             semblance.fit(paraboloid(9), patches_w=3)
         with self.assertRaisesRegex(semblance.ConfigError, "patches_u"):
@@ -159,7 +159,7 @@ class Interpolation(unittest.TestCase):
             np.testing.assert_allclose(depth[known], 7.5, atol=1e-6)
             self.assertEqual(sd.shape, depth.shape)
 
-    def test_faults_are_told(self):
+    def test_faults_are_reported(self):
         vertices, triangles = sphere(rings=6)
         with self.assertRaisesRegex(semblance.InputError, "names vertex 999"):
             semblance.interpolate(vertices, [[0, 1, 999]], vertices[:2], vertices[:2], [1, 2])
@@ -171,18 +171,18 @@ class Experiments(unittest.TestCase):
     QUICK = {"subject.rings": 24, "implicit.resolution": 16, "seeds.level": 0, "template.max_level": 1,
              "first_fit": [], "fit.plan.schedule": [{"level": 0, "fraction": 1}]}
 
-    def test_a_run_gives_what_its_files_say(self):
+    def test_a_run_returns_the_contents_of_its_files(self):
         config = os.path.join(SOURCE, "configs", "phantom.yaml")
         with tempfile.TemporaryDirectory() as folder:
             out = os.path.join(folder, "run")
             run = semblance.run(config, set=self.QUICK, out=out)
             written = semblance.HSpline.read(os.path.join(out, "face.hspline.json"))
             with self.assertRaises(semblance.IoError):
-                semblance.run(config, set=self.QUICK, out=out)  # nothing is overwritten unasked
+                semblance.run(config, set=self.QUICK, out=out)  # no file is replaced without force
         self.assertTrue((run["surface"].net(0) == written.net(0)).all())
         self.assertGreater(run["result"]["face"]["rms_mm"], 0)
 
-    def test_a_study_gives_its_long_table(self):
+    def test_a_study_returns_its_long_table(self):
         with tempfile.TemporaryDirectory() as folder:
             study = os.path.join(folder, "study.yaml")
             with open(study, "w") as file:
@@ -194,9 +194,9 @@ class Experiments(unittest.TestCase):
             self.assertEqual(len(found), len(table))
             with self.assertRaisesRegex(semblance.IoError, "no plan.json"):
                 semblance.study(folder)
-            with self.assertRaisesRegex(semblance.InputError, "leave 'out' away"):
+            with self.assertRaisesRegex(semblance.InputError, "omit 'out'"):
                 semblance.study(os.path.join(folder, "out"), out="elsewhere")
-            os.chdir(folder)  # where out/study lies
+            os.chdir(folder)  # contains out/study
             try:
                 again = semblance.study("study.yaml")
                 self.assertTrue(os.path.isfile("out/study/trials.csv"))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Runs the Python of docs/how-to/python.md, block after block, as it stands there."""
+"""Runs the Python of docs/how-to/python.md, block after block, as they are written there."""
 import os
 import re
 import sys
