@@ -17,6 +17,7 @@
 #include "problems/face/template_source.h"
 #include "problems/io/given_files.h"
 #include "problems/face/hspline_prior.h"
+#include "problems/app/work_options.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/feature.h"
@@ -236,8 +237,7 @@ void DeclareExport(CLI::App& to, CommandLine& line) {
   to.add_option("--chord_mm", a.chord_mm,
                 "largest distance of a triangle from the surface of an H-spline [0.1]")
       ->check(Finite());
-  to.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
-      ->check(CLI::Range(1, 1024));
+  AddThreads(to, a.threads);
   AddForce(to, a);
 }
 
@@ -322,8 +322,7 @@ void DeclarePrior(CLI::App& prior, CommandLine& line) {
       ->check(CLI::Range(1, 10000));
   prior.add_option("--level", a.level, "level of the B-splines that represent them [2]")
       ->check(CLI::Range(0, 8));
-  prior.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
-      ->check(CLI::Range(1, 1024));
+  AddThreads(prior, a.threads);
   a.prior.count = 60;
   AddForce(prior, a);
 }

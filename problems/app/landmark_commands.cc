@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -96,7 +95,7 @@ void DeclareConvert(CLI::App& convert, CommandLine& line) {
 struct ProposeArguments {
   std::string skull, out, compare;
   std::vector<std::pair<std::string, std::string>> references;  // skull, landmarks
-  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  int threads = DefaultThreads();
   bool force = false, quiet = false;
   std::stop_token stop;
 };
@@ -184,8 +183,7 @@ void DeclarePropose(CLI::App& propose, CommandLine& line) {
       "landmarks placed by hand: prints the error of each site; writes no file unless "
       "--out is given");
   propose.add_flag("--force", a.force, "replace a file of the same name");
-  propose.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
-      ->check(CLI::Range(1, 1024));
+  AddThreads(propose, a.threads);
   propose.add_flag("--quiet", a.quiet, "no progress");
 }
 

@@ -9,7 +9,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "problems/app/exit_code.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
@@ -97,7 +96,7 @@ int WritePhantom(const PhantomArguments& a) {
 
 void DeclarePhantom(CLI::App& command, CommandLine& line) {
   PhantomArguments& a = *Bind(command, line, &WritePhantom);
-  a.ct.threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  a.ct.threads = DefaultThreads();
   command.add_option("--out", a.out, "folder for ct/, landmarks.yaml and true_skin.ply")
       ->required();
   command.add_option("--random-seed,--seed", a.phantom.random_seed, "number of the head")

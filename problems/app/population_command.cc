@@ -8,7 +8,6 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "problems/app/exit_code.h"
@@ -18,6 +17,7 @@
 #include "problems/io/output_folder.h"
 #include "problems/population/population_result.h"
 #include "problems/population/population_run.h"
+#include "problems/program/work_options.h"
 
 namespace semblance::problems {
 namespace {
@@ -29,7 +29,7 @@ struct PopulationArguments {
   std::string path, out, shard;
   std::vector<std::string> from;
   PopulationRunOptions run;
-  int threads = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  int threads = DefaultThreads();
   bool quiet = false, list = false, force = false;
   std::stop_token stop;
 };
@@ -178,7 +178,7 @@ void DeclarePopulation(CLI::App& command, CommandLine& line) {
       ->required();
   command.add_option("--out", a.out, "folder for the results; a population in it is continued");
   command.add_option("--jobs", a.run.jobs, "subjects at a time")->check(CLI::Range(1, 1024));
-  command.add_option("--threads", a.threads, "threads to use")->check(CLI::Range(1, 1024));
+  AddThreads(command, a.threads);
   command.add_option("--shard", a.shard,
                      "I/N: measure only every N-th subject, beginning with the I-th (from 0)");
   command.add_option("--from", a.from,

@@ -11,7 +11,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -144,14 +143,9 @@ void DeclareTemplate(CLI::App& command, CommandLine& line) {
 // recentre
 // ---------------------------------------------------------------------------------------------
 
-struct RecentreArguments {
+struct RecentreArguments : WorkOptions {
   std::vector<fs::path> heads;
-  std::vector<std::string> overrides;
-  std::string out;
   RecentreOptions options;
-  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
-  bool force = false;
-  std::stop_token stop;
 };
 
 Experiment ReadKnown(const fs::path& config, const RecentreArguments& a) {
@@ -232,14 +226,10 @@ void DeclareRecentre(CLI::App& command, CommandLine& line) {
       ->check(Finite())
       ->check(CLI::Range(0.1, 1e6))
       ->capture_default_str();
-  command
-      .add_option("--set", a.overrides,
-                  "path=value, replaces an option of each configuration; may be repeated")
-      ->allow_extra_args(false);
+  AddSet(command, a);
   command.add_flag("--force", a.force,
                    "replace files of the same name in a folder that is not empty");
-  command.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
-      ->check(CLI::Range(1, 1024));
+  AddThreads(command, a.threads);
 }
 
 }  // namespace

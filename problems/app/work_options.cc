@@ -24,12 +24,15 @@ void AddOutput(CLI::App& command, WorkOptions& options) {
                    "replace files of the same name in a folder that is not empty");
 }
 
-void AddWork(CLI::App& command, CommandLine& line, WorkOptions& options) {
-  options.stop = line.stop;
-  command
-      .add_option("--threads", options.threads, "threads to use; the result does not depend on it")
+void AddThreads(CLI::App& command, int& threads) {
+  command.add_option("--threads", threads, "threads to use; the result does not depend on it")
       ->check(WholeNumber())
       ->check(CLI::Range(1, 1024));
+}
+
+void AddWork(CLI::App& command, CommandLine& line, WorkOptions& options) {
+  options.stop = line.stop;
+  AddThreads(command, options.threads);
   command.add_flag("--quiet", options.quiet, "no progress");
 }
 

@@ -19,10 +19,14 @@
 
 namespace semblance::problems {
 
+inline int DefaultThreads() {
+  return static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+}
+
 struct WorkOptions {
   std::vector<std::string> overrides;
   std::string out;
-  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  int threads = DefaultThreads();
   bool force = false, quiet = false;
   std::stop_token stop;
 };
@@ -31,6 +35,8 @@ struct WorkOptions {
 void AddSet(CLI::App& command, WorkOptions& options);
 // Adds --out and --force.
 void AddOutput(CLI::App& command, WorkOptions& options);
+// Adds --threads.
+void AddThreads(CLI::App& command, int& threads);
 // Adds --threads and --quiet.
 void AddWork(CLI::App& command, CommandLine& line, WorkOptions& options);
 

@@ -20,6 +20,7 @@
 #include "problems/io/output_folder.h"
 #include "problems/app/program_end.h"
 #include "problems/app/workbench/http_server.h"
+#include "problems/app/work_options.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
@@ -32,7 +33,7 @@ struct WorkbenchArguments {
   std::string source, out;
   std::vector<std::pair<std::string, std::string>> references;
   int port = 0;
-  int threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  int threads = DefaultThreads();
   bool open = false;
   std::stop_token stop;
 };
@@ -114,8 +115,7 @@ void DeclareWorkbench(CLI::App& workbench, CommandLine& line) {
   workbench.add_option(
       "--reference", a.references,
       "SKULL LANDMARKS: a skull with known landmarks, for proposals; may be repeated");
-  workbench.add_option("--threads", a.threads, "threads to use; the result does not depend on it")
-      ->check(CLI::Range(1, 1024));
+  AddThreads(workbench, a.threads);
   workbench.add_flag("--open", a.open, "open the page in the desktop's browser (xdg-open)");
 }
 

@@ -17,7 +17,8 @@
 //
 //   3. Full face of the last run (face_), as TakeSnapshot reports it:
 //
-//                    run ends                 edits change
+//                    run ends, or
+//                    a stored run is found    edits change
 //        NO FACE ----------------> SAVED <--------------------> UNSAVED
 //                                   |  ^                           |  ^
 //               landmarks, options  |  |  the same changed back,   |  |
@@ -49,19 +50,18 @@
 // INVARIANTS (mutex_ is held whenever they may be broken)
 //
 //   (1) experiment_, subject_, checks_ and present_key_ belong to the current step of history_.
-//   Only
-//       Commit changes these members. It computes all of them before it writes the folder, and
-//       assigns them afterwards, so that an exception leaves the Bench unchanged.
-//   (2) workbench.yaml is history_: it is written before the assignment. config.yaml,
-//       landmarks.yaml and edits.yaml follow from the current step. If the process ends between
-//       these writes, the next workbench reads workbench.yaml and writes the others again.
+//       Commit alone changes these members. It computes all of them before it writes the folder,
+//       and assigns them afterwards, so that an exception leaves the Bench unchanged.
+//   (2) workbench.yaml is history_; Commit replaces it as a whole before the assignment. Then it
+//       writes config.yaml, landmarks.yaml and edits.yaml, which follow from the current step. If
+//       one of these writes fails, workbench.yaml is a step ahead until the next Commit. If the
+//       process ends between them, the next workbench reads workbench.yaml and writes the others.
 //   (3) subject_ holds the meshes that the files of subject_key_ contained when they were loaded.
 //       They are loaded again only when another file, axis or unit is chosen.
 //   (4) face_ is fresh if and only if face_->key == present_key_; a variant, if and only if its key
 //       is VariantsKey(). Faces are never deleted when they become stale.
-//   (5) run_key.txt is written after run/ and kBeforeEdits. A next workbench uses a stored face
-//   only
-//       if that hash is of its own current step, edits included.
+//   (5) run_key.txt is written after run/ and kBeforeEdits. A later workbench uses a stored face
+//       only if this hash belongs to its own current step, edits included.
 //   (6) revision_ grows with every Commit, every kept feature and every finished run.
 //       subject_revision_ grows with every new subject_. face_revision_ is the revision at which
 //       face_ was set.
