@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The tables of commands. Each is defined in a file of its own, e.g. FaceCommands in
+// The tables of commands. Each is defined in a separate file, e.g. FaceCommands in
 // face_commands.cc; main.cc declares all of them.
 #pragma once
 

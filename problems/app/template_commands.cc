@@ -221,7 +221,7 @@ void DeclareRecentre(CLI::App& command, CommandLine& line) {
       ->capture_default_str();
   command.add_flag(
       "--mean", a.options.move_mean,
-      "move the mean too; the template then contains shape of the skins of these heads");
+      "move the mean too; the template then contains part of the shape of these skins");
   command.add_option("--mean_prior", a.options.mean_prior, "weight of the present mean, in points")
       ->check(Finite())
       ->check(CLI::Range(0.1, 1e6))

@@ -7,8 +7,8 @@ import {PullPreview} from './pull_preview.js';
 import {act, showMessage, store} from './store.js';
 
 const MAX_DRAG_MM = 60;
-// A normal whose projection on the view is shorter than this points nearly at the viewer. Up and down then pull along it,
-// because its direction in the view is too uncertain.
+// A normal whose projection on the view is shorter than this points nearly at the viewer. A drag up or down then pulls
+// along it, because dividing by the short projection would make the pull much longer than the drag.
 const FACING = 0.35;
 const KEYS = {o: 'out', i: 'in', a: 'left', d: 'right', w: 'up', s: 'down'};
 

@@ -445,7 +445,7 @@ BenchReply Find(Bench& bench, const BenchRequest& request) {
     }
   }
   if (request.method != "GET") {
-    return ErrorReply(404, "no address here takes POST");
+    return ErrorReply(404, "this address takes no POST");
   }
   constexpr std::string_view kRun = "run/";
   return request.path.starts_with(kRun) ? RunFile(bench, request.path.substr(kRun.size()))

@@ -18,7 +18,7 @@ struct BenchRequest {
 };
 
 struct BenchReply {
-  int status = 500;  // of HTTP
+  int status = 500;  // HTTP status
   std::string type = "text/plain; charset=utf-8";
   std::string body = "no reply";
   std::string download_name;  // if the browser should save the body as a file

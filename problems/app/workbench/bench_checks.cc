@@ -59,7 +59,8 @@ void MeasureMirrors(std::span<const SitePoint> sites, const MidPlane& plane,
 
 void Predict(const SkullFit& fit, std::span<const SitePoint> sites, const MeshQuery& bone,
              LandmarkChecks& checks) {
-  // Farther predictions lie beside missing or broken bone.
+  // A larger limit would offer predictions beside missing bone, a smaller one would drop good ones
+  // on unusual skulls.
   constexpr double kFarthest_mm = 15;
   for (std::size_t k = 0; k < sites.size(); ++k) {
     checks.sites[sites[k].site].from_predicted_mm = fit.residual_mm[k];

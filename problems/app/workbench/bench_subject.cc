@@ -24,8 +24,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Size of the shown skull. Landmarks are clicked on it: fewer triangles move them off the true
-// bone, more make the page slow.
+// Size of the shown skull, on which landmarks are clicked. Fewer triangles show less detail of the
+// bone, more make the page slow. Landmarks are placed on the full mesh in any case.
 constexpr int kSkullTriangles = 60000;
 
 TriMesh ReadInMm(const fs::path& path, const FileSubject& files) {

@@ -28,7 +28,7 @@ class PopulationCommand : public ::testing::Test {
                                     title, count));
   }
 
-  // Heads without landmarks, which cannot be proposed for them either.
+  // Heads without landmarks, for which none can be proposed.
   void WriteUnmarkedHeads(int count) {
     for (int k = 1; k <= count; ++k) {
       const Phantom phantom =
