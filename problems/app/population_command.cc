@@ -17,7 +17,7 @@
 #include "problems/io/output_folder.h"
 #include "problems/population/population_result.h"
 #include "problems/population/population_run.h"
-#include "problems/program/work_options.h"
+#include "problems/app/work_options.h"
 
 namespace semblance::problems {
 namespace {

@@ -2,9 +2,9 @@
 // Variants side by side under one camera: builds of a table, or all depths minus and plus a standard deviation. They are
 // coarse at first, and full once they have been made.
 import {get} from './api.js';
-import {sizeOf} from './changes.js';
+import {sizeOf} from './scene.js';
 import {button, check, element, select} from './dom.js';
-import {act, download, showMessage, store} from './store.js';
+import {FACE_FORMATS, act, download, showMessage, store} from './store.js';
 
 const TITLES = {emaciated: 'Emaciated', normal: 'Normal', obese: 'Obese', thinner: '\u2212 1 SD', as_is: 'Present', thicker: '+ 1 SD'};
 const SETS = {
@@ -12,7 +12,6 @@ const SETS = {
   deviations: {text: '\u00b1 1 standard deviation', variants: ['thinner', 'as_is', 'thicker'], middle: 'as_is'},
   all: {text: 'All', variants: ['emaciated', 'normal', 'obese', 'thinner', 'as_is', 'thicker'], middle: 'as_is'},
 };
-const FORMATS = ['.ply', '.obj', '.stl', '.glb', '.off', '.step', '.iges', '.vtu'];
 
 // Title and distances from the middle face.
 const caption = (title, values) => {
@@ -28,7 +27,7 @@ export function comparePanel({scene}) {
       button(text, () => { chosen = name; draw(); }, {dataset: {set: name}}));
   const status = element('p', {className: 'soft', role: 'status'}), kind = element('p', {className: 'compare-kind'});
   const note = element('p', {className: 'bad'}), make = element('div', {className: 'row'}), save = element('div');
-  const format = select(FORMATS.map((ending) => [ending, ending]), '.ply', () => {});
+  const format = select(FACE_FORMATS.map((ending) => [ending, ending]), '.ply', () => {});
   format.setAttribute('aria-label', 'kind of file');
   const legend = element('div', {className: 'legend-place'}), home = scene.legend.parentElement;
   const root = element('div', {},

@@ -2,12 +2,11 @@
 // The options that lead to a face: the few that matter most, single depths, and all others.
 import {controlAt, tree} from './controls.js';
 import {button, check, element, field, group, lines} from './dom.js';
-import {act, download, nameOf, store} from './store.js';
+import {FACE_FORMATS, act, download, nameOf, store} from './store.js';
 
 const MAIN = [['tissue.depths', 'depths from'], ['tissue.table', 'table'], ['tissue.fill_from', 'missing depths from'],
               ['tissue.sex', 'sex'], ['tissue.build', 'build'], ['template', 'template'], ['face', 'method'],
               ['interp', 'interpolation']];
-const FORMATS = ['.ply', '.obj', '.stl', '.glb', '.off', '.step', '.iges', '.vtu'];
 const HIDDEN = ['subject', 'title', 'edits', 'base'];
 
 function stateLine(faces) {
@@ -43,7 +42,7 @@ export function facePanel({faces, scene}) {
   const clear = element('input', {type: 'range', min: 0.1, max: 1, step: 0.05, value: scene.shared.layers.get('face').opacity,
                                   oninput: () => { scene.shared.layers.get('face').opacity = Number(clear.value); scene.update(); }});
   search.setAttribute('aria-label', 'find an option');
-  const format = element('select', {}, ...FORMATS.map((ending) => element('option', {value: ending, textContent: ending})));
+  const format = element('select', {}, ...FACE_FORMATS.map((ending) => element('option', {value: ending, textContent: ending})));
   format.setAttribute('aria-label', 'kind of file');
   const save = element('div', {className: 'row'}, 'Save the full face as', format, button('Save', () => download('export', {format: format.value})));
   const root = element('div', {}, line,

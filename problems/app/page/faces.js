@@ -2,7 +2,7 @@
 // The face that is shown: the full face of the run if it belongs to the present state, otherwise a coarse one; and the
 // change of the face by the last action.
 import {get} from './api.js';
-import {sizeOf} from './changes.js';
+import {sizeOf} from './scene.js';
 
 export class Faces {
   constructor(scene) {

@@ -2,7 +2,6 @@
 // The 3-D view: skull, skin, landmarks, depth markers and faces on one or several canvases under one camera. Canvases,
 // camera and measuring are those of a report's view (SemblanceStage, SemblanceCamera, SemblanceMeasure).
 import {element} from './dom.js';
-import {changeBetween} from './changes.js';
 import {nameOf} from './store.js';
 
 const LAYERS = {
@@ -15,6 +14,30 @@ const MAPS = {
   change: {title: 'change of the face, outwards +', low_mm: -8, high_mm: 8, no_data: '#8f8f8f',
            colours: ['#053061', '#2166ac', '#4393c3', '#92c5de', '#d1e5f0', '#f7f7f7', '#fddbc7', '#f4a582', '#d6604d',
                      '#b2182b', '#67001f']},
+};
+
+// Distances in mm between two faces with the same vertices, along the normals of the former face; outwards is positive.
+// Null if the faces have different vertices.
+const changeBetween = (former, now) => {
+  const a = former.attributes.position, b = now.attributes.position, normals = former.attributes.normal.array;
+  if (a.count !== b.count) { return null; }
+  const values = new Float32Array(a.count);
+  for (let v = 0; v < a.count; ++v) {
+    let sum = 0;
+    for (let k = 3 * v; k < 3 * v + 3; ++k) { sum += (b.array[k] - a.array[k]) * normals[k]; }
+    values[v] = sum;
+  }
+  return values;
+};
+
+// {most, mean}: maximum and mean of the absolute changes in mm.
+export const sizeOf = (values) => {
+  let most = 0, sum = 0;
+  for (const value of values) {
+    most = Math.max(most, Math.abs(value));
+    sum += Math.abs(value);
+  }
+  return {most, mean: values.length ? sum / values.length : 0};
 };
 
 export class Scene {

@@ -2,8 +2,7 @@
 // Editing the face by hand: a point of it is dragged, or held and pulled by buttons and keys, at the chosen level. Every
 // pull is an edit of control vertices in edits.yaml, which `semblance edit` and `semblance run` replay.
 import {button, check, element, field, group, select} from './dom.js';
-import {get} from './api.js';
-import {PullPreview} from './pull_preview.js';
+import {get, post} from './api.js';
 import {act, showMessage, store} from './store.js';
 
 const MAX_DRAG_MM = 60;
@@ -35,6 +34,61 @@ const pullOf = (stage, held, mode, right, down) => {
   const by = seen > FACING ? (right * across - down * upwards) * size / (seen * seen) : -down * size;
   return held.normal.clone().multiplyScalar(Math.max(-MAX_DRAG_MM, Math.min(MAX_DRAG_MM, by)));
 };
+
+// The face while a point of it is dragged. The program computes the displacement of each vertex per millimetre of the
+// pull; the page adds them up. At release the program makes the real pull.
+class PullPreview {
+  constructor(scene, point, options) {
+    this.scene = scene;
+    this.geometry = scene.faceGeometry();
+    this.before = this.geometry.attributes.position.array.slice();
+    this.moves = null;  // for pulls along x, y and z: each coordinate, in hundredths
+    this.by = null;
+    this.due = false;
+    post('pull', {at: point.toArray(), ...options}).then(({per_mm: all}) => {
+      this.moves = all.map((blobs) => blobs.map(SemblanceGeometry.valuesOf));
+      if (this.by) { this.show(this.by); }
+    }).catch(() => {});  // the pull at release will show the error
+  }
+
+  show(by) {
+    this.by = by.clone();
+    if (!this.moves || this.due) { return; }
+    this.due = true;
+    requestAnimationFrame(() => {
+      this.due = false;
+      if (this.by) { this.apply(this.by.toArray()); }
+    });
+  }
+
+  apply(by) {
+    if (this.scene.faceGeometry() !== this.geometry) { return; }  // another face was loaded meanwhile
+    const {array} = this.geometry.attributes.position;
+    for (let v = 0; v < array.length / 3; ++v) {
+      for (let k = 0; k < 3; ++k) {
+        const at = 3 * v + k;
+        array[at] = this.before[at];
+        for (let axis = 0; axis < 3; ++axis) { array[at] += by[axis] * this.moves[axis][k][v] / 100; }
+      }
+    }
+    this.redraw();
+  }
+
+  restore() {
+    this.by = null;
+    if (this.scene.faceGeometry() !== this.geometry) { return; }
+    this.geometry.attributes.position.array.set(this.before);
+    this.redraw();
+  }
+
+  stop() { this.by = null; }
+
+  redraw() {
+    this.geometry.attributes.position.needsUpdate = true;
+    this.geometry.computeVertexNormals();
+    this.scene.draw();
+  }
+}
 
 export function sculptPanel({scene, faces}) {
   const options = {level: 2, reach: 2, mirror: true}, stage = scene.main.stage;

@@ -33,6 +33,9 @@ export const act = async (name, details = {}) => {
   }
 };
 
+// Endings of the files in which the program exports a face.
+export const FACE_FORMATS = ['.ply', '.obj', '.stl', '.glb', '.off', '.step', '.iges', '.vtu'];
+
 // Saves a file made by the program through the browser. If the program refuses, the reason is shown.
 export const download = async (path, query) => {
   try {
