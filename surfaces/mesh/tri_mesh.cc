@@ -188,12 +188,16 @@ std::vector<VertexLoop> VertexRings(const TriMesh& mesh, const char* caller) {
   std::vector<VertexLoop> rings;
   for (const OpenMesh::VertexHandle v : half_edges.vertices()) {
     VertexLoop& ring = rings.emplace_back();
-    for (const OpenMesh::VertexHandle neighbour : half_edges.vv_ccw_range(v)) {
-      ring.push_back(neighbour.idx());
+    if (half_edges.is_isolated(v)) {
+      continue;
     }
-    if (!ring.empty() && half_edges.is_boundary(v)) {  // OpenMesh starts at the last neighbour
-      std::rotate(ring.begin(), ring.begin() + 1, ring.end());
+    // On a border OpenMesh's half-edge of the vertex is the last one counter-clockwise.
+    const OpenMesh::HalfedgeHandle last = half_edges.halfedge_handle(v);
+    for (OpenMesh::HalfedgeHandle h = half_edges.ccw_rotated_halfedge_handle(last); h != last;
+         h = half_edges.ccw_rotated_halfedge_handle(h)) {
+      ring.push_back(half_edges.to_vertex_handle(h).idx());
     }
+    ring.push_back(half_edges.to_vertex_handle(last).idx());
   }
   return rings;
 }

@@ -142,7 +142,8 @@ std::string EncodeOff(const TriMesh& mesh, Precision precision) {
 std::string EncodeStl(const TriMesh& mesh) {
   constexpr std::size_t kWords = 80;
   std::string bytes = "binary stl file";
-  bytes.resize(kWords, ' ');
+  bytes.resize(kWords - 1, ' ');
+  bytes += '\0';
   AppendRaw(bytes, static_cast<std::uint32_t>(mesh.triangles.size()));
   for (const Triangle& t : mesh.triangles) {
     const Vec3 area_vector = TriangleAreaVector(mesh, t);
