@@ -110,7 +110,7 @@ std::string DisplayName(const std::string& layer, const std::string& module) {
 }
 
 // The rank of a module in its layer; -1 if the layer has no such module.
-int RankOf(const std::string& layer, const std::string& module) {
+int FindRank(const std::string& layer, const std::string& module) {
   const Ranks& ranks = kModules.at(layer);
   for (std::size_t k = 0; k < ranks.size(); ++k) {
     if (ranks[k].contains(module)) {
@@ -123,7 +123,7 @@ int RankOf(const std::string& layer, const std::string& module) {
 // Both files belong to the same layer.
 std::vector<std::string> CheckModules(const std::string& file, const std::string& included) {
   const std::string layer = LayerOf(file), from = ModuleOf(file), to = ModuleOf(included);
-  if (from == to || RankOf(layer, to) < RankOf(layer, from)) {
+  if (from == to || FindRank(layer, to) < FindRank(layer, from)) {
     return {};
   }
   return {fmt::format("{} includes {}: {} is not above {} in the order of modules", file, included,
@@ -226,7 +226,7 @@ std::map<std::string, std::map<std::string, std::vector<std::string>>> FilesByFo
 TEST(Architecture, EveryFileBelongsToAModule) {
   for (const auto& [layer, folders] : FilesByFolder()) {
     for (const auto& [folder, files] : folders) {
-      EXPECT_GE(RankOf(layer, ModuleOf(files[0])), 0) << folder << " is not in kModules";
+      EXPECT_GE(FindRank(layer, ModuleOf(files[0])), 0) << folder << " is not in kModules";
       if (folder != layer) {
         EXPECT_GE(files.size(), kMinFiles) << folder;
         EXPECT_LE(files.size(), kMaxFiles) << folder;
@@ -261,7 +261,7 @@ TEST(Architecture, TestsMirrorTheModules) {
         continue;
       }
       const auto tested = module_of_stem.find(layer + "/" + stem.substr(0, stem.size() - 5));
-      EXPECT_GE(RankOf(layer, module), 0) << entry.path();
+      EXPECT_GE(FindRank(layer, module), 0) << entry.path();
       EXPECT_TRUE(tested == module_of_stem.end() || tested->second == module)
           << entry.path() << " tests a file of " << DisplayName(layer, tested->second);
     }
@@ -398,7 +398,7 @@ TEST(Architecture, PlantedIncludesAgainstTheOrderAreFound) {
               ElementsAre(HasSubstr("is not above")));
   EXPECT_THAT(check("problems/experiment/case.cc", "problems/run.h"),
               ElementsAre(HasSubstr("is not above the front door of problems")));
-  EXPECT_EQ(RankOf("fitting", "nowhere"), -1);
+  EXPECT_EQ(FindRank("fitting", "nowhere"), -1);
 }
 
 TEST(Architecture, AllowedIncludesPass) {
