@@ -68,7 +68,7 @@ double FeaturePriorWeight(const FeatureRule& rule) {
 // there are no points.
 bool AreOfPointsAlone(std::span<const Term> terms) {
   return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
-    return WeightOf(term) == 0 || std::holds_alternative<PointTerm>(term) ||
+    return TermWeight(term) == 0 || std::holds_alternative<PointTerm>(term) ||
            std::holds_alternative<LandmarkTerm>(term);
   });
 }
@@ -413,7 +413,7 @@ FitResult Fit(const HSplineSurface& start, const FitTarget& target,
 FitResult Fit(const HSplineSurface& start, const ScatteredPoints& points, const FitOptions& options,
               const RunContext& context) {
   if (!IsAlone(options)) {
-    return Fit(start, TargetOf(points.positions, points.uv, points.weights), {}, options, context);
+    return Fit(start, MakeFitTarget(points.positions, points.uv, points.weights), {}, options, context);
   }
   CheckFit(start, points, options);
   return FitAlone(start, points, std::get<AutoPlan>(options.plan), context);

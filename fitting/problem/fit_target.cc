@@ -57,7 +57,7 @@ void CheckShapePoints(std::span<const ShapePoint> shape) {
 
 }  // namespace
 
-FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
+FitTarget MakeFitTarget(std::span<const Vec3> positions, std::span<const Vec2> uv,
                    std::span<const double> weights) {
   CheckSizes({positions, uv, weights});
   FitTarget target;

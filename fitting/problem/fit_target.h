@@ -65,7 +65,7 @@ struct ScatteredPoints {
 
 // Makes a target of scattered points without labels. weights: one per point, or empty for equal
 // weights. Throws InputError if the sizes differ.
-FitTarget TargetOf(std::span<const Vec3> positions, std::span<const Vec2> uv,
+FitTarget MakeFitTarget(std::span<const Vec3> positions, std::span<const Vec2> uv,
                    std::span<const double> weights = {});
 
 // Throws InputError that names the point if a point has a position that is not finite, a (u,v)

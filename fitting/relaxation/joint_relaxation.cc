@@ -230,7 +230,7 @@ void JointRound::AddPoints(ControlNet& net, std::vector<Vec2>& places,
   for (const Term& term : level_.terms) {
     const auto* const points = std::get_if<PointTerm>(&term);
     const auto* const landmarks = std::get_if<LandmarkTerm>(&term);
-    if (WeightOf(term) <= 0 || (points == nullptr && landmarks == nullptr)) {
+    if (TermWeight(term) <= 0 || (points == nullptr && landmarks == nullptr)) {
       continue;
     }
     for (std::size_t k = 0; k < places.size(); ++k) {

@@ -139,7 +139,7 @@ int AutoTerm(std::span<const Term> terms) {
 double PointWeight(std::span<const Term> terms) {
   double sum = 0;
   for (const Term& term : terms) {
-    sum += std::holds_alternative<PointTerm>(term) ? WeightOf(term) : 0;
+    sum += std::holds_alternative<PointTerm>(term) ? TermWeight(term) : 0;
   }
   return sum;
 }

@@ -34,7 +34,7 @@ double TypicalStiffness(std::span<const Term> terms, std::size_t vertices) {
   double sum = 0;
   for (const Term& term : terms) {
     const auto* const prior = std::get_if<PriorTerm>(&term);
-    sum += prior != nullptr && prior->held_only ? 0 : WeightOf(term);
+    sum += prior != nullptr && prior->held_only ? 0 : TermWeight(term);
   }
   return sum / static_cast<double>(vertices);
 }

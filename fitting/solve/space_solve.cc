@@ -23,7 +23,7 @@ namespace {
 // never; reweighting converges linearly.
 constexpr int kMaxSteps = 50, kMaxReweightings = 300;
 
-bool IsActive(const Term& term) { return WeightOf(term) > 0; }
+bool IsActive(const Term& term) { return TermWeight(term) > 0; }
 
 bool IsSmoothness(const Term& term) {
   return IsActive(term) && (std::holds_alternative<SmoothnessTerm>(term) ||
@@ -614,7 +614,7 @@ std::vector<double> SpaceSolve::LossFactors(const std::vector<double>& squares) 
       }
     } else {
       for (std::size_t k = 0; k < squares.size(); ++k) {
-        factors[k] += WeightOf(term) / all * LandmarkFactor(k);
+        factors[k] += TermWeight(term) / all * LandmarkFactor(k);
       }
     }
   }

@@ -317,7 +317,7 @@ inline std::string_view TermName(const Term& term) {
   return std::visit([](const auto& t) { return t.kName; }, term);
 }
 
-inline double WeightOf(const Term& term) {
+inline double TermWeight(const Term& term) {
   return std::visit([](const auto& t) -> double { return t.weight; }, term);
 }
 

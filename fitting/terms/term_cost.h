@@ -71,7 +71,7 @@ bool IsLinear(const T& term) {
 }
 inline bool AllLinear(std::span<const Term> terms) {
   return std::all_of(terms.begin(), terms.end(), [](const Term& term) {
-    return WeightOf(term) <= 0 || std::visit([](const auto& t) { return IsLinear(t); }, term);
+    return TermWeight(term) <= 0 || std::visit([](const auto& t) { return IsLinear(t); }, term);
   });
 }
 
@@ -110,7 +110,7 @@ void AddResiduals(const T& term, const LevelView& view, ControlNet& net, ceres::
 inline void AddResiduals(std::span<const Term> terms, const LevelView& view, ControlNet& net,
                          ceres::Problem& problem) {
   for (const Term& term : terms) {
-    if (WeightOf(term) > 0) {
+    if (TermWeight(term) > 0) {
       std::visit([&](const auto& t) { AddResiduals(t, view, net, problem); }, term);
     }
   }

@@ -34,7 +34,7 @@ bool TreatsAxesAlike(const Term& term) { return SeparableButForLoss(std::span(&t
 std::vector<Term> OthersAmong(std::span<const Term> terms) {
   std::vector<Term> others;
   std::copy_if(terms.begin(), terms.end(), std::back_inserter(others),
-               [](const Term& term) { return WeightOf(term) > 0 && !IsPointTerm(term); });
+               [](const Term& term) { return TermWeight(term) > 0 && !IsPointTerm(term); });
   return others;
 }
 

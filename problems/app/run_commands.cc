@@ -123,7 +123,7 @@ int RunCommand(const Arguments& arguments) {
   folder.Publish();
   PrintNotes(result.Notes());
   if (result.truth) {
-    fmt::print("{}; closest-point distances\n", InWords(result.truth->skin));
+    fmt::print("{}; closest-point distances\n", ToPhrase(result.truth->skin));
     PrintFaceError("first face", result.truth->implicit);
     PrintFaceError("recovered face", result.truth->face);
   }

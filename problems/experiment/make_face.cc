@@ -301,7 +301,7 @@ void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
   constexpr double kUsualDepth_mm = 10;  // stands for the unknown depth in PublishedSd_mm
   std::map<std::string, Vec3> places;
   for (const auto& [site, at] : prior.sites) {
-    places[site] = PositionOf(at, prior.model.mean, prior.model.mean.points);
+    places[site] = FindPosition(at, prior.model.mean, prior.model.mean.points);
   }
   std::map<std::string, double> missing_mm;
   for (const auto& [site, place] : places) {
@@ -527,7 +527,7 @@ TriMesh SeedableFace(const Experiment& experiment, std::span<const CutPlane> cut
     subject.notes.push_back(
         fmt::format("the skull is cut off at {}: no seeds within {:.0f} mm of there, and the face "
                     "beyond it is the template's",
-                    InWords(plane), experiment.cut_margin_mm));
+                    ToPhrase(plane), experiment.cut_margin_mm));
   }
   return WithinScan(implicit, cuts, experiment.cut_margin_mm);
 }

@@ -26,7 +26,7 @@ Similarity PlaceBySites(const FacePrior& prior, const TemplateFace& face) {
   for (const auto& [site, at] : prior.sites) {
     if (const auto uv = face.site_uv.find(site); uv != face.site_uv.end()) {
       on_template.push_back(face.surface.Point(uv->second));
-      on_mean.push_back(PositionOf(at, prior.model.mean, prior.model.mean.points));
+      on_mean.push_back(FindPosition(at, prior.model.mean, prior.model.mean.points));
     }
   }
   return PlaceTemplate(on_template, on_mean);
@@ -113,7 +113,7 @@ HSplineSurface MakeFaceSurface(const ShapeEstimate& estimate, const FacePrior& p
   const Similarity& place = estimate.subject_from_model;
   std::vector<Vec3> samples;
   for (std::size_t k = 0; k < on_template.under.size(); ++k) {
-    samples.emplace_back(PositionOf(on_template.under[k], prior.model.mean, estimate.points) +
+    samples.emplace_back(FindPosition(on_template.under[k], prior.model.mean, estimate.points) +
                          place.scale * (place.rotation * on_template.beside[k]));
   }
   return SurfaceThrough(shape, on_template.grid, samples);
@@ -128,7 +128,7 @@ HSplineSurface MovedAsDrawn(const HSplineSurface& face, const ShapeEstimate& est
   }
   for (std::size_t k = 0; k < on_template.under.size(); ++k) {
     samples.emplace_back(face.Point(on_template.grid.UvAt(k)) +
-                         PositionOf(on_template.under[k], prior.model.mean, moves));
+                         FindPosition(on_template.under[k], prior.model.mean, moves));
   }
   return SurfaceThrough(face.shape(), on_template.grid, samples);
 }
@@ -216,7 +216,7 @@ Vec2 NearestSample(const Vec3& p, const FacePrior& prior, const PriorOnTemplate&
   std::size_t best = 0;
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t k = 0; k < on_template.under.size(); ++k) {
-    const Vec3 at = PositionOf(on_template.under[k], prior.model.mean, prior.model.mean.points) +
+    const Vec3 at = FindPosition(on_template.under[k], prior.model.mean, prior.model.mean.points) +
                     on_template.beside[k];
     if (const double squared = (at - p).squaredNorm(); squared < least) {
       least = squared;

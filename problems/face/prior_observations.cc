@@ -115,7 +115,7 @@ ShapeTarget PriorTarget(const FacePrior& prior, std::span<const Dowel> dowels,
     if (own == prior.sites.end()) {
       continue;
     }
-    on_mean.push_back(PositionOf(at->second, prior.model.mean, prior.model.mean.points));
+    on_mean.push_back(FindPosition(at->second, prior.model.mean, prior.model.mean.points));
     on_subject.push_back(dowel.Tip());
   }
   if (on_mean.size() < 3) {

@@ -50,7 +50,7 @@ std::map<std::string, Vec3> FindPlaces(const FacePrior& prior, const KnownHead& 
     if (skin.Closest(dowel.Tip()).distance_mm <= tip_mm) {
       const MeshPoint at = face.Closest(dowel.Tip());
       places[dowel.site] =
-          PositionOf({at.triangle, at.weights}, prior.model.mean, prior.model.mean.points);
+          FindPosition({at.triangle, at.weights}, prior.model.mean, prior.model.mean.points);
     }
   }
   return places;
@@ -88,7 +88,7 @@ std::map<std::string, Vec3> MeanSites(const FacePrior& prior,
       continue;
     }
     Places all = seen->second;
-    all.Add(site, PositionOf(own->second, prior.model.mean, prior.model.mean.points), site_prior);
+    all.Add(site, FindPosition(own->second, prior.model.mean, prior.model.mean.points), site_prior);
     Vec3 place = all.sum / all.weight;
     place.x() *= site.side == Side::kMidline ? 0 : 1;
     sites[site.code] = site.side == Side::kRight ? MirroredInX(place) : place;
@@ -108,8 +108,8 @@ FacePrior WithSites(FacePrior prior, const std::map<std::string, Vec3>& sites) {
 double MedianMove(const FacePrior& before, const FacePrior& after) {
   std::vector<double> moves;
   for (const auto& [site, at] : after.sites) {
-    moves.push_back((PositionOf(at, after.model.mean, after.model.mean.points) -
-                     PositionOf(before.sites.at(site), before.model.mean, before.model.mean.points))
+    moves.push_back((FindPosition(at, after.model.mean, after.model.mean.points) -
+                     FindPosition(before.sites.at(site), before.model.mean, before.model.mean.points))
                         .norm());
   }
   return UpperMedian(moves);

@@ -91,7 +91,7 @@ bool IsAmong(std::span<const std::string_view> outputs, std::string_view name) {
   });
 }
 
-bool IsOneOf(std::span<const fs::path> given, const fs::path& out) {
+bool IsAnyOf(std::span<const fs::path> given, const fs::path& out) {
   const fs::path replaced = FilePlaces(out)[0];  // writing replaces a link, not its target
   return std::ranges::any_of(given, [&](const fs::path& file) {
     return !IsNoFile(file) && std::ranges::count(FilePlaces(file), replaced) > 0;
@@ -99,7 +99,7 @@ bool IsOneOf(std::span<const fs::path> given, const fs::path& out) {
 }
 
 void RefuseToReplace(const fs::path& out, std::span<const fs::path> given) {
-  if (IsOneOf(given, out)) {
+  if (IsAnyOf(given, out)) {
     throw InputError(fmt::format(
         "{}: this file is read, and input files are never replaced; name another output file",
         out.string()));
@@ -134,7 +134,7 @@ void RefuseToReplace(const fs::path& folder, const GivenFiles& given) {
 std::vector<std::string> OldFiles(const fs::path& folder, const GivenFiles& job,
                                   const std::vector<fs::path>& written) {
   const auto may_remove = [&](const fs::path& name) {
-    return std::ranges::find(written, name) == written.end() && !IsOneOf(job.files, folder / name);
+    return std::ranges::find(written, name) == written.end() && !IsAnyOf(job.files, folder / name);
   };
   std::vector<std::string> old;
   for (const ManifestLine& line : ReadManifestLines(folder / "manifest.json")) {

@@ -33,7 +33,7 @@ bool IsAmong(std::span<const std::string_view> outputs, std::string_view name);
 
 // True if writing `out` would replace one of the files, by this name or another: links are
 // followed.
-bool IsOneOf(std::span<const std::filesystem::path> given, const std::filesystem::path& out);
+bool IsAnyOf(std::span<const std::filesystem::path> given, const std::filesystem::path& out);
 
 // Throws InputError if writing `out` would replace one of the files.
 void RefuseToReplace(const std::filesystem::path& out,

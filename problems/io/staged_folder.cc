@@ -261,7 +261,7 @@ void StagedFolder::MoveFiles() {
     if (fs::is_directory(root_ / file, error)) {
       KeepAndFail(fmt::format("{} is a folder there", file.string()));
     }
-    if (IsOneOf(given_.files, root_ / file)) {
+    if (IsAnyOf(given_.files, root_ / file)) {
       KeepAndFail(fmt::format("{} is a file that was read", file.string()));
     }
   }

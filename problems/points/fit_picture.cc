@@ -37,7 +37,7 @@ Vec3 MeanNormal(const TriMesh& mesh) {
   return area > 0 ? Vec3(sum / area) : Vec3::Zero();
 }
 
-// Of what the triangles show: a trimmed grid has points beyond.
+// The bounds of the vertices that have triangles.
 Box3 BoxShown(const TriMesh& mesh, const Mat3& view_from_world) {
   Box3 box;
   for (const Triangle& t : mesh.triangles) {

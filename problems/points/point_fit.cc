@@ -119,7 +119,7 @@ FitOptions WithoutRelaxation(FitOptions fit) {
 void AddTermFaults(std::span<const Term> terms, std::vector<OptionFault>& faults) {
   for (std::size_t k = 0; k < terms.size(); ++k) {
     if (const std::string_view missing = MissingPart(terms[k]);
-        !missing.empty() && WeightOf(terms[k]) > 0) {
+        !missing.empty() && TermWeight(terms[k]) > 0) {
       faults.push_back({fmt::format("fit.terms[{}]", k),
                         fmt::format("the term '{}' needs {}, and points of a file have none; "
                                     "leave it out",
@@ -257,7 +257,7 @@ GivenPoints KeepFacts(const PointTable& table, ParameterSource source,
 FitResult FitOwned(const HSplineSurface& start, OwnedPoints points, std::vector<ExactPoint> exact,
                    const FitOptions& options, const RunContext& context) {
   if (!exact.empty()) {
-    FitTarget target = TargetOf(points.positions, points.uv, points.weights);
+    FitTarget target = MakeFitTarget(points.positions, points.uv, points.weights);
     target.exact = std::move(exact);
     return Fit(start, target, {}, options, context);
   }

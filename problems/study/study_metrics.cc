@@ -236,21 +236,21 @@ Better DefaultBetter(const std::string& metric) {
                                                    : Better::kLower;
 }
 
-double Preference::CostOf(double value) const {
+double Preference::RankingCost(double value) const {
   return better == Better::kHigher    ? -value
          : better == Better::kNearest ? std::abs(value - target)
                                       : value;
 }
 
 double Preference::Compared(double value) const {
-  return better == Better::kNearest ? CostOf(value) : value;
+  return better == Better::kNearest ? RankingCost(value) : value;
 }
 
 bool Preference::IsBetter(double compared, double than) const {
   return better == Better::kHigher ? compared > than : compared < than;
 }
 
-std::string Preference::InWords() const {
+std::string Preference::ToPhrase() const {
   return better == Better::kHigher    ? "higher is better"
          : better == Better::kNearest ? fmt::format("nearest to {} is better", target)
                                       : "lower is better";

@@ -36,12 +36,12 @@ struct Preference {
 
   // Less cost is better. The cost of a treatment is the mean over its subjects, so that errors of
   // opposite sign do not cancel.
-  double CostOf(double value) const;
+  double RankingCost(double value) const;
   // The quantity of differences and curves: the value, or for kNearest its distance from the
   // target.
   double Compared(double value) const;
   bool IsBetter(double compared, double than) const;  // for two results of Compared
-  std::string InWords() const;                        // "nearest to 0.9 is better"
+  std::string ToPhrase() const;                        // "nearest to 0.9 is better"
   std::string TargetSuffix() const;  // suffix to the metric: ", distance from 0.9", or "" unless kNearest
 };
 

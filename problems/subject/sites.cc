@@ -213,7 +213,7 @@ const Site* FindSite(std::string_view code) {
   return at == AllSites().end() ? nullptr : &*at;
 }
 
-std::string MirrorOf(std::string_view code) {
+std::string MirroredSite(std::string_view code) {
   const Site* const site = FindSite(code);
   return site == nullptr ? "" : site->mirror;
 }

@@ -39,7 +39,7 @@ const std::vector<Site>& AllSites();
 const Site* FindSite(std::string_view code);
 
 // The code of the site on the other side; empty if no site has the code.
-std::string MirrorOf(std::string_view code);
+std::string MirroredSite(std::string_view code);
 
 bool IsStandardSite(std::string_view site);
 bool IsFurtherSite(std::string_view site);

@@ -68,7 +68,7 @@ std::vector<CutPlane> FindLids(const TriMesh& mesh) {
       mesh, [&](const CutPlane& plane) { return LidArea_mm2(plane, mesh) >= kLeastLid_mm2; });
 }
 
-std::string InWords(const CutPlane& plane) {
+std::string ToPhrase(const CutPlane& plane) {
   constexpr std::array<std::array<const char*, 2>, 3> kEnds = {
       {{"right", "left"}, {"front", "back"}, {"lower", "upper"}}};
   return fmt::format("{} = {:.1f} mm ({} end)", "xyz"[plane.axis], plane.at_mm,

@@ -29,7 +29,7 @@ std::vector<CutPlane> FindCutPlanes(const TriMesh& skull);
 std::vector<CutPlane> FindLids(const TriMesh& mesh);
 
 // For messages, e.g. "z = 0.0 mm (lower end)".
-std::string InWords(const CutPlane& plane);
+std::string ToPhrase(const CutPlane& plane);
 
 // The part of a face for which the scan has bone: the triangles on the skull's side of all planes,
 // at least margin_mm from each.

@@ -17,7 +17,7 @@ int main() {
       StartSurface({.patches_u = 8, .patches_v = 8, .max_level = 3}, points, uv);
   const FitOptions options{.plan = AdaptivePlan{.tolerance_mm = 0.01, .finest = 3},
                            .terms = {PointTerm{}, SmoothnessTerm{.weight = 1e-6}}};
-  const FitResult fit = Fit(start, TargetOf(points, uv), {}, options, {});
+  const FitResult fit = Fit(start, MakeFitTarget(points, uv), {}, options, {});
   std::cout << "rms " << fit.point_rms_mm << " mm, centre "
             << fit.surface.Point({0.5, 0.5}).transpose() << '\n';
   return fit.usable ? 0 : 1;

@@ -49,7 +49,7 @@ std::optional<MidPlane> TryFitMidPlane(std::span<const SitePoint> sites) {
 void MeasureMirrors(std::span<const SitePoint> sites, const MidPlane& plane,
                     LandmarkChecks& checks) {
   for (const SitePoint& site : sites) {
-    const auto partner = std::ranges::find(sites, MirrorOf(site.site), &SitePoint::site);
+    const auto partner = std::ranges::find(sites, MirroredSite(site.site), &SitePoint::site);
     if (partner != sites.end()) {
       const double apart = (plane.Mirrored(partner->point) - site.point).norm();
       checks.sites[site.site].from_mirror_mm = partner->site == site.site ? apart / 2 : apart;

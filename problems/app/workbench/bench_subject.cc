@@ -105,7 +105,7 @@ FileSubject ToFiles(const CtSubject& subject, const fs::path& meshes, BenchState
 
 std::string LowerExtension(const fs::path& path) { return LowerCase(path.extension().string()); }
 
-bool IsOneOf(const std::string& extension, std::initializer_list<const char*> extensions) {
+bool IsAnyOf(const std::string& extension, std::initializer_list<const char*> extensions) {
   return std::ranges::find(extensions, extension) != extensions.end();
 }
 
@@ -123,7 +123,7 @@ Subject SubjectFromSource(const fs::path& source) {
   if (source.empty()) {
     return files;
   }
-  if (IsOneOf(LowerExtension(source), {".ply", ".obj", ".stl", ".off"})) {
+  if (IsAnyOf(LowerExtension(source), {".ply", ".obj", ".stl", ".off"})) {
     files.skull = fs::absolute(source);
     return files;
   }
@@ -183,7 +183,7 @@ BenchBeginning BeginFromConfig(const fs::path& config, const fs::path& meshes,
 BenchBeginning BeginBench(const fs::path& source, const fs::path& folder,
                           const RunContext& context) {
   const fs::path meshes = folder / "subject";
-  if (IsOneOf(LowerExtension(source), {".yaml", ".yml"})) {
+  if (IsAnyOf(LowerExtension(source), {".yaml", ".yml"})) {
     return BeginFromConfig(source, meshes, context);
   }
   BenchBeginning beginning{.experiment = DefaultExperiment(folder), .state = {}, .notes = {}};

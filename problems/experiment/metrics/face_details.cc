@@ -170,7 +170,7 @@ Json SkinJson(const ScoredSkin& skin) {
   }
   json["ends"] = Json::array();
   for (const CutPlane& end : skin.ends) {
-    json["ends"].push_back(InWords(end));
+    json["ends"].push_back(ToPhrase(end));
   }
   return json;
 }
@@ -214,7 +214,7 @@ Json ScoreToJson(const FaceMetrics& metrics, const FaceDetails& details, const S
   return json;
 }
 
-std::string InWords(const ScoredSkin& skin) {
+std::string ToPhrase(const ScoredSkin& skin) {
   std::string left_out;
   const auto names = EnumNames(SkinStatus{});
   for (const SkinStatus status : {SkinStatus::kMasked, SkinStatus::kInner, SkinStatus::kEnd}) {

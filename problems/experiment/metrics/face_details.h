@@ -102,6 +102,6 @@ nlohmann::ordered_json ScoreToJson(const FaceMetrics& metrics, const FaceDetails
                                    const ScoredSkin& skin);
 
 // "312 cm² of skin scored; left out: 20 cm² masked, 156 cm² inner, 14 cm² end".
-std::string InWords(const ScoredSkin& skin);
+std::string ToPhrase(const ScoredSkin& skin);
 
 }  // namespace semblance::problems

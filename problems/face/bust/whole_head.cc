@@ -178,7 +178,7 @@ WholeHeadFit FitWholeHead(const TriMesh& mesh, const std::string& name, const Ru
                  kHeadSamplesPerPatch * kShape.PatchesV(kShape.max_level));
   const HSplineSurface start = StartSurface(kShape, samples.points, samples.uv);
   const FitResult fit =
-      Fit(start, TargetOf(samples.points, samples.uv), {}, HeadFitOptions(), context);
+      Fit(start, MakeFitTarget(samples.points, samples.uv), {}, HeadFitOptions(), context);
   WholeHeadFit result{.head = {Shortened(fit.surface), Eyeballs(domain)}, .usable = fit.usable};
   double sum = 0, most = 0;
   for (std::size_t k = 0; k < samples.uv.size(); ++k) {

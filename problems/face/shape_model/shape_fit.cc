@@ -149,7 +149,7 @@ NearestTip NearestTipTo(const Vec3& p, const ShapeModel& model, const ShapeTarge
   NearestTip nearest;
   bool first = true;
   for (const ShapeTip& tip : target.tips) {
-    const Vec3 at = PositionOf(tip.at, model.mean, model.mean.points);
+    const Vec3 at = FindPosition(tip.at, model.mean, model.mean.points);
     const double squared_mm = (at - p).squaredNorm();
     if (std::exchange(first, false) || squared_mm < nearest.squared_mm) {
       nearest = {squared_mm, tip.shared_sd_mm};
@@ -311,7 +311,7 @@ void ShapeEstimator::Place() {
 }
 
 Vec3 NormalAt(const ModelPoint& at, const TriMesh& mesh, const std::vector<Vec3>& normals) {
-  return PositionOf(at, mesh, normals).normalized();
+  return FindPosition(at, mesh, normals).normalized();
 }
 
 void ShapeEstimator::ObserveTips() {
@@ -468,13 +468,13 @@ ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
   }
   for (const ShapeTip& tip : target_.tips) {
     result.tip_residual_mm.push_back(
-        (tip.position - PositionOf(tip.at, model_.mean, placed_.points))
+        (tip.position - FindPosition(tip.at, model_.mean, placed_.points))
             .dot(NormalAt(tip.at, model_.mean, normals_)));
   }
   for (const ShapeMark& mark : target_.marks) {
     Vec3 at = Vec3::Zero();
     for (const ModelPoint& point : mark.at) {
-      at += PositionOf(point, model_.mean, placed_.points) / static_cast<double>(mark.at.size());
+      at += FindPosition(point, model_.mean, placed_.points) / static_cast<double>(mark.at.size());
     }
     result.mark_residual_mm.push_back((mark.position - at).dot(mark.direction));
   }

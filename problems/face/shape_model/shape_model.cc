@@ -60,7 +60,7 @@ std::vector<Vec3> ShapeAt(const ShapeModel& model, const Eigen::VectorXd& coeffi
   return points;
 }
 
-Vec3 PositionOf(const ModelPoint& at, const TriMesh& mean, const std::vector<Vec3>& points) {
+Vec3 FindPosition(const ModelPoint& at, const TriMesh& mean, const std::vector<Vec3>& points) {
   const Triangle& t = mean.triangles.at(at.triangle);
   return at.weights[0] * points[t[0]] + at.weights[1] * points[t[1]] + at.weights[2] * points[t[2]];
 }

@@ -42,7 +42,7 @@ void CheckShapeModel(const ShapeModel& model, std::string_view name);
 std::vector<Vec3> ShapeAt(const ShapeModel& model, const Eigen::VectorXd& coefficients);
 
 // The position of a model point on a shape. points: one per point of the mean.
-Vec3 PositionOf(const ModelPoint& at, const TriMesh& mean, const std::vector<Vec3>& points);
+Vec3 FindPosition(const ModelPoint& at, const TriMesh& mean, const std::vector<Vec3>& points);
 
 // The fixed part of the pose. It lies near the solution, so that omega and t are well conditioned.
 struct ShapeFrame {

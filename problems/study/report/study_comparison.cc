@@ -80,7 +80,7 @@ std::vector<std::string> CommonSubjects(std::span<const NamedStudy> studies,
 double MeanCost(const ComparedTreatment& treatment, const Preference& preference) {
   double sum = 0;
   for (const auto& [subject, value] : treatment.by_subject) {
-    sum += preference.CostOf(value);
+    sum += preference.RankingCost(value);
   }
   return sum / static_cast<double>(treatment.by_subject.size());
 }
@@ -295,7 +295,7 @@ TreatmentMeans ComputeMeans(const std::map<std::string, ValuesBySubject>& treatm
     double sum = 0, cost = 0;
     for (const auto& [subject, count] : have) {
       sum += treatments.at(label).at(subject);
-      cost += preference.CostOf(treatments.at(label).at(subject));
+      cost += preference.RankingCost(treatments.at(label).at(subject));
     }
     means.value.push_back(sum / static_cast<double>(have.size()));
     means.cost.push_back(cost / static_cast<double>(have.size()));
@@ -349,7 +349,7 @@ std::string RankText(const RankAgreement& agreement) {
   }
   std::string text = fmt::format(
       "{} in {} and in {}; {}\n{:<{}}  rank       mean  rank       mean\n", agreement.metric,
-      agreement.reference, agreement.study, agreement.preference.InWords(), "treatment", width);
+      agreement.reference, agreement.study, agreement.preference.ToPhrase(), "treatment", width);
   for (const RankedTreatment& t : agreement.treatments) {
     text += fmt::format("{:<{}} {:5.1f} {:10.4g} {:5.1f} {:10.4g}\n", t.label, width,
                         t.reference_rank, t.reference_mean, t.rank, t.mean);

@@ -26,7 +26,7 @@ std::vector<Treatment> RankTreatments(const StudyResults& results) {
   const auto cost = [&](const Treatment& treatment) {
     double sum = 0;
     for (const auto& [subject, value] : treatment.by_subject) {
-      sum += results.preference.CostOf(value);
+      sum += results.preference.RankingCost(value);
     }
     return sum / static_cast<double>(treatment.by_subject.size());  // NaN without one
   };
@@ -41,7 +41,7 @@ std::string RankingOrderText(const Preference& preference) {
   return preference.better == Better::kLower ? "best mean first"
          : preference.better == Better::kHigher
              ? "best mean first (higher is better)"
-             : fmt::format("best first ({}: by the mean distance from it)", preference.InWords());
+             : fmt::format("best first ({}: by the mean distance from it)", preference.ToPhrase());
 }
 
 double MeanSeconds(const StudyResults& results, const Treatment& treatment) {

@@ -98,7 +98,7 @@ std::vector<std::vector<double>> CompleteTable(const StudyResults& results,
     std::vector<double> row;
     for (const Treatment& treatment : treatments) {
       if (const auto it = treatment.by_subject.find(subject); it != treatment.by_subject.end()) {
-        row.push_back(results.preference.CostOf(it->second));
+        row.push_back(results.preference.RankingCost(it->second));
       }
     }
     if (row.size() == treatments.size()) {

@@ -221,7 +221,7 @@ std::set<std::string> NamesBetween(const StudyResults& results, const std::strin
 
 // A remark for columns of the metric itself, unless lower values are better.
 std::string Direction(const StudyResults& results) {
-  return results.preference.better == Better::kLower ? "" : ", " + results.preference.InWords();
+  return results.preference.better == Better::kLower ? "" : ", " + results.preference.ToPhrase();
 }
 
 bool HigherIsBetter(const StudyResults& results) {

@@ -449,7 +449,7 @@ TEST(CoupledSolve, DivergingStepsAreRejected) {
       uv.emplace_back(std::clamp(u, 0.0, 1.0), std::clamp(v, 0.0, 1.0));
     }
     const FitResult fit =
-        Fit(StartSurface(shape, positions, uv), TargetOf(positions, uv), {}, options, {});
+        Fit(StartSurface(shape, positions, uv), MakeFitTarget(positions, uv), {}, options, {});
     EXPECT_LT(fit.point_rms_mm, 0.3) << seed;
   }
 }

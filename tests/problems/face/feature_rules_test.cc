@@ -107,7 +107,7 @@ TEST(FeatureRules, MarksLieOnTheirLandmarks) {
   const RuleMarks all = ApplyRules(AllRules(), AverageLandmarks(), {}, Ict());
   const TriMesh& mean = Ict().model.mean;
   const auto at = [&](std::size_t k) {
-    return PositionOf(all.marks.at(k).at.front(), mean, mean.points);
+    return FindPosition(all.marks.at(k).at.front(), mean, mean.points);
   };
   EXPECT_GT(at(1).x(), 15);  // eye_l
   EXPECT_LT(at(0).x(), -15);
@@ -123,12 +123,12 @@ TEST(FeatureRules, AnEstimateFollowsAMark) {
   ShapeTarget target{.start = {}, .tips = {}, .surface = nullptr, .features = {}};
   for (const auto& [site, at] : Ict().sites) {
     ShapeTip tip{.label = site, .at = at};
-    tip.position = PositionOf(at, Ict().model.mean, Ict().model.mean.points);
+    tip.position = FindPosition(at, Ict().model.mean, Ict().model.mean.points);
     target.tips.push_back(tip);
   }
   RuleMarks rules = ApplyRules({}, AverageLandmarks(), {}, Ict());
   ShapeMark mark = rules.marks.at(0);
-  const Vec3 eye = PositionOf(mark.at.front(), Ict().model.mean, Ict().model.mean.points);
+  const Vec3 eye = FindPosition(mark.at.front(), Ict().model.mean, Ict().model.mean.points);
   mark.position = eye + 3 * Vec3::UnitZ();
   mark.at.resize(1);
   ShapeFitOptions options;
@@ -137,7 +137,7 @@ TEST(FeatureRules, AnEstimateFollowsAMark) {
   target.marks = {mark};
   const ShapeEstimate after = EstimateShape(Ict().model, target, options, {});
   const auto height = [&](const ShapeEstimate& e) {
-    return PositionOf(mark.at.front(), Ict().model.mean, e.points).z();
+    return FindPosition(mark.at.front(), Ict().model.mean, e.points).z();
   };
   EXPECT_GT(height(after), height(before) + 0.1);
   EXPECT_NEAR(after.mark_residual_mm.at(0), mark.position.z() - height(after), 1e-9);

@@ -33,9 +33,9 @@ struct Heads {
     for (const auto& [site, at] : prior.sites) {
       Dowel dowel;
       dowel.site = site;
-      dowel.direction = PositionOf(at, skin, normals).normalized();
+      dowel.direction = FindPosition(at, skin, normals).normalized();
       dowel.depth_mm = 5;
-      Vec3 tip = PositionOf(at, prior.model.mean, prior.model.mean.points);
+      Vec3 tip = FindPosition(at, prior.model.mean, prior.model.mean.points);
       tip.z() += site == "g" ? 6 : 0;
       if (site == "g") {
         glabella = tip;

@@ -70,11 +70,11 @@ TEST(Sites, EachIsFoundByItsCodeAndIsTheMirrorOfItsMirror) {
   EXPECT_EQ(AllSites().size(), StandardSites().size() + FurtherSites().size());
   for (const Site& site : AllSites()) {
     EXPECT_EQ(FindSite(site.code), &site) << site.code;
-    EXPECT_EQ(MirrorOf(MirrorOf(site.code)), site.code);
-    EXPECT_EQ(MirrorOf(site.code) == site.code, site.side == Side::kMidline) << site.code;
+    EXPECT_EQ(MirroredSite(MirroredSite(site.code)), site.code);
+    EXPECT_EQ(MirroredSite(site.code) == site.code, site.side == Side::kMidline) << site.code;
   }
   EXPECT_EQ(FindSite("go"), nullptr);
-  EXPECT_EQ(MirrorOf("mine"), "");
+  EXPECT_EQ(MirroredSite("mine"), "");
 }
 
 using ::testing::HasSubstr;

@@ -30,7 +30,7 @@ TEST(CutPlanes, AScanThatEndsIsFound) {
   EXPECT_EQ(planes[0].axis, 2);
   EXPECT_EQ(planes[0].sign, -1);
   EXPECT_EQ(planes[0].at_mm, -20);
-  EXPECT_EQ(InWords(planes[0]), "z = -20.0 mm (lower end)");
+  EXPECT_EQ(ToPhrase(planes[0]), "z = -20.0 mm (lower end)");
 }
 
 TEST(CutPlanes, AHoleInTheSkullIsNoCut) {

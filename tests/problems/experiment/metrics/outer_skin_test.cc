@@ -91,7 +91,7 @@ TEST(OuterSkin, ALidIsAnEndAndNotOuter) {
   const TriMesh cut = Solid(44, -20, Ball);
   const OuterSkin skin = FindOuterSkin(cut, 6);
   ASSERT_EQ(skin.ends.size(), 1u);
-  EXPECT_EQ(InWords(skin.ends[0]).substr(0, 3), "z =");
+  EXPECT_EQ(ToPhrase(skin.ends[0]).substr(0, 3), "z =");
   for (std::size_t v = 0; v < cut.points.size(); ++v) {
     const Vec3& p = cut.points[v];
     if (p.z() > -16 || (p.z() < -18 && p.head<2>().norm() < 30)) {

@@ -60,7 +60,7 @@ Similarity SomePlace() {
 
 ShapeTip TipAt(const ShapeModel& model, int triangle, const std::vector<Vec3>& shape) {
   ShapeTip tip{.label = "tip", .at = {triangle, {0.2, 0.3, 0.5}}};
-  tip.position = PositionOf(tip.at, model.mean, shape);
+  tip.position = FindPosition(tip.at, model.mean, shape);
   return tip;
 }
 
