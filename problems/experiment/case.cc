@@ -124,8 +124,7 @@ void NoteDroppedAreas(Case& subject) {
 
 // The dowels at their landmarks as given, before these were laid onto bone. So a skin is scored in
 // the same way with and without its skull.
-std::vector<Dowel> DowelsAsGiven(const Case& subject) {
-  std::vector<Dowel> dowels = subject.dowels_on_bone;
+std::vector<Dowel> DowelsAsGiven(const Case& subject, std::vector<Dowel> dowels) {
   for (Dowel& dowel : dowels) {
     dowel.base = subject.points.at(dowel.site);
   }
@@ -166,18 +165,6 @@ std::vector<Dowel> ExpectedDowels(const Experiment& experiment, const LandmarkFi
 
 bool UsesAllAsGiven(const PlaceOptions& options) {
   return std::holds_alternative<KeepAll>(options.keep) && options.noise_mm == 0;
-}
-
-// Replaces the dowels by those of the landmarks that the experiment uses, with noise if it wants
-// some. Their depths are filled again, because notes and faults must concern the used landmarks
-// alone. Returns notes.
-std::vector<std::string> UseSome(const SubjectData& data, const PlaceOptions& options,
-                                 const TissueOptions& tissue, const MeshQuery& skull,
-                                 Case& subject) {
-  UsedLandmarks used = LandmarksInUse(data.landmarks, skull, options);
-  subject.dowels_on_bone = PlaceDowels(used.file, data.skull, skull, options);
-  Append(used.notes, FillDepths(tissue, data.landmarks, subject.dowels_on_bone));
-  return used.notes;
 }
 
 // The network's plan without the landmarks that the experiment does not use. The gaps are closed.
@@ -230,17 +217,20 @@ Case StartCase(const SubjectData& data, const Experiment& experiment, const Mesh
   return subject;
 }
 
-// Gives the dowels their depths. All dowels, before some are left out, decide what is scored.
+// Keeps the dowels of the landmarks that the experiment uses, with noise if it wants some, and gives
+// them their depths. All dowels, before some are left out, decide what is scored.
 void GiveDepths(const SubjectData& data, const Experiment& experiment, const MeshQuery& query,
                 Case& subject) {
   const TissueOptions tissue = WithSiteDepths(experiment, data.landmarks);
-  const std::vector<std::string> on_depths =
-      FillDepths(tissue, data.landmarks, subject.dowels_on_bone);
-  subject.basis = MakeScoreBasis(DowelsAsGiven(subject));
-  subject.scored_on_bone = subject.dowels_on_bone;
-  Append(subject.notes, UsesAllAsGiven(experiment.landmarks)
-                            ? on_depths
-                            : UseSome(data, experiment.landmarks, tissue, query, subject));
+  std::vector<Dowel> all = subject.dowels_on_bone;
+  if (!UsesAllAsGiven(experiment.landmarks)) {
+    const UsedLandmarks used = LandmarksInUse(data.landmarks, query, experiment.landmarks);
+    subject.dowels_on_bone = PlaceDowels(used.file, data.skull, query, experiment.landmarks);
+    Append(subject.notes, used.notes);
+  }
+  Append(subject.notes, FillDepths(tissue, data.landmarks, all, subject.dowels_on_bone));
+  subject.basis = MakeScoreBasis(DowelsAsGiven(subject, all));
+  subject.scored_on_bone = std::move(all);
   Append(subject.notes, ConditionDepths(tissue, data.landmarks, subject.dowels_on_bone));
 }
 
