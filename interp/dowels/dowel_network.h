@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "interp/dowels/dowel.h"
+#include "surfaces/base/fields.h"
 
 namespace semblance::interp {
 
@@ -18,6 +19,15 @@ struct NetworkPlan {
   std::string title;
   std::vector<std::array<std::string, 3>> areas;  // sites, e.g. {"sg", "g", "mso_l"}
 };
+template <class Visitor>
+void Fields(Visitor& visit, NetworkPlan& plan) {
+  visit(FieldInfo{.name = "title", .doc = "what the network is and where it comes from"},
+        plan.title);
+  visit(FieldInfo{.name = "areas",
+                  .min = 1,
+                  .doc = "the three sites of each area, counter-clockwise seen from outside"},
+        plan.areas);
+}
 
 // The network of one subject, with areas as indices into the subject's dowels.
 struct DowelNetwork {

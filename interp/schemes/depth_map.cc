@@ -56,7 +56,7 @@ MappedDepth ReadMap(const DepthMap& options, const TriMesh& skull) {
                     options.mesh.string()));
   }
   return {ReadMesh(options.file),
-          PlyVertexScalar(ReadFileBytes(options.file), options.scalar, where)};
+          ReadPlyVertexScalar(ReadFileBytes(options.file), options.scalar, where)};
 }
 
 void CheckMap(const MappedDepth& map, const DepthMap& options) {

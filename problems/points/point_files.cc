@@ -141,7 +141,7 @@ void TakeWeights(const PlyHeader& header, std::string_view bytes, const std::str
     return;
   }
   table.weights_of_sigma = sigma;
-  table.weights = PlyVertexScalar(bytes, sigma ? "sigma" : "weight", name);
+  table.weights = ReadPlyVertexScalar(bytes, sigma ? "sigma" : "weight", name);
   for (std::size_t k = 0; k < table.weights.size(); ++k) {
     double& number = table.weights[k];
     const bool positive = number > 0;
@@ -155,7 +155,7 @@ void TakeWeights(const PlyHeader& header, std::string_view bytes, const std::str
 
 std::vector<double> FiniteScalar(std::string_view bytes, const std::string& scalar,
                                  const std::string& name) {
-  std::vector<double> values = PlyVertexScalar(bytes, scalar, name);
+  std::vector<double> values = ReadPlyVertexScalar(bytes, scalar, name);
   const auto bad =
       std::find_if_not(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
   if (bad != values.end()) {
@@ -245,7 +245,7 @@ bool HasFaces(const PlyHeader& header) {
 PointTable ParsePlyPoints(std::string_view bytes, const std::string& name,
                           std::span<const std::string> attributes) {
   const PlyHeader header = ReadPlyHeader(bytes, name);
-  const auto scalar = [&](const char* of) { return PlyVertexScalar(bytes, of, name); };
+  const auto scalar = [&](const char* of) { return ReadPlyVertexScalar(bytes, of, name); };
   const std::vector<double> x = scalar("x"), y = scalar("y"), z = scalar("z");
   PointTable table;
   for (std::size_t k = 0; k < x.size(); ++k) {

@@ -13,16 +13,6 @@
 
 namespace semblance::problems {
 
-template <class Visitor>
-void Fields(Visitor& visit, NetworkPlan& plan) {
-  visit(FieldInfo{.name = "title", .doc = "what the network is and where it comes from"},
-        plan.title);
-  visit(FieldInfo{.name = "areas",
-                  .min = 1,
-                  .doc = "the three sites of each area, counter-clockwise seen from outside"},
-        plan.areas);
-}
-
 // Reads a plan: a title and the areas by their three sites, which need not be standard sites.
 // Throws IoError if the file cannot be read, ConfigError if it is not such a file, and InputError
 // if it has no area, an area names a site twice, or an area appears twice.

@@ -183,9 +183,9 @@ TriMesh ReadMesh(const std::filesystem::path& path) {
   if (mesh.triangles.empty()) {
     throw InputError(fmt::format("{}: the mesh has no triangles; give a surface", name));
   }
-  if (mesh.triangles.size() > kMostElements) {
+  if (mesh.triangles.size() > kMaxElements) {
     throw InputError(fmt::format("{}: the mesh has {} triangles; at most {} are allowed", name,
-                                 mesh.triangles.size(), kMostElements));
+                                 mesh.triangles.size(), kMaxElements));
   }
   return mesh;
 }

@@ -56,8 +56,8 @@ class ObjReader {
  private:
   // x y z, then nothing, a weight, a colour, or both.
   void ReadVertex() {
-    if (static_cast<std::int64_t>(mesh_.points.size()) == kMostElements) {
-      lines_.Fail(fmt::format("more than {} vertices; decimate the mesh", kMostElements));
+    if (static_cast<std::int64_t>(mesh_.points.size()) == kMaxElements) {
+      lines_.Fail(fmt::format("more than {} vertices; decimate the mesh", kMaxElements));
     }
     mesh_.points.push_back(lines_.NextPoint());
     std::array<double, 4> numbers;
@@ -154,7 +154,7 @@ class ObjReader {
                          std::size_t so_far, HighestIndex& highest) const {
     const auto count = static_cast<std::int64_t>(so_far);
     const std::int64_t index = given > 0 ? given - 1 : count + given;
-    if (given == 0 || index < 0 || index >= kMostElements) {
+    if (given == 0 || index < 0 || index >= kMaxElements) {
       lines_.Fail(fmt::format("a face names {} {}; allowed are 1 to the number of {}, or -1 to -{}",
                               thing, given, things, count));
     }

@@ -65,10 +65,10 @@ class OffReader {
     if (lines_.RestOfLine().starts_with("BINARY")) {
       lines_.Fail("binary OFF is not read; write the mesh as text OFF or as PLY");
     }
-    vertices_ = lines_.NextInteger("number of vertices", 0, kMostElements);
-    faces_ = lines_.NextInteger("number of faces", 0, kMostElements);
+    vertices_ = lines_.NextInteger("number of vertices", 0, kMaxElements);
+    faces_ = lines_.NextInteger("number of faces", 0, kMaxElements);
     if (!lines_.AtLineEnd()) {
-      lines_.NextInteger("number of edges", 0, 2 * kMostElements);
+      lines_.NextInteger("number of edges", 0, 2 * kMaxElements);
     }
     lines_.ExpectLineEnd();
     constexpr std::int64_t kShortestVertex = 6, kShortestFace = 8;  // "0 0 0\n", "3 0 1 2\n"
@@ -103,7 +103,7 @@ class OffReader {
     std::vector<std::int32_t> corners;
     for (std::int64_t f = 0; f < faces_; ++f) {
       ExpectLine("faces", f, faces_);
-      const std::int64_t size = lines_.NextInteger("number of corners", 3, kMostElements);
+      const std::int64_t size = lines_.NextInteger("number of corners", 3, kMaxElements);
       corners.clear();
       for (std::int64_t c = 0; c < size; ++c) {
         corners.push_back(

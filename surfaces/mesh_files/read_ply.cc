@@ -88,7 +88,7 @@ class PlyHeaderReader {
 
   void ReadElement() {
     const std::string name = NextName(header_.elements);
-    const std::int64_t count = lines_.NextInteger("number of elements", 0, kMostElements);
+    const std::int64_t count = lines_.NextInteger("number of elements", 0, kMaxElements);
     header_.elements.push_back({name, count, {}});
   }
 
@@ -598,7 +598,7 @@ TriMesh ReadPly(std::string_view bytes, const std::string& name) {
              : ReadMeshData(PlyBinaryData(bytes, header, name), header, name);
 }
 
-std::vector<double> PlyVertexScalar(std::string_view bytes, const std::string& scalar,
+std::vector<double> ReadPlyVertexScalar(std::string_view bytes, const std::string& scalar,
                                     const std::string& name) {
   PlyHeader header = ReadPlyHeader(bytes, name);
   PlyElement& vertex = FindElement(header, "vertex", name);

@@ -15,7 +15,7 @@ namespace semblance::surfaces {
 
 // The largest number of vertices, faces or other elements in a file: an index of a triangle can
 // name no more.
-inline constexpr std::int64_t kMostElements = 2147483647;
+inline constexpr std::int64_t kMaxElements = 2147483647;
 
 // The largest step between coordinates that loses nothing of a mesh. Single precision has smaller
 // steps below 1024 mm.

@@ -20,7 +20,7 @@ TriMesh Read(std::string_view bytes) {
   const char first = bytes.empty() ? 'p' : bytes.front();
   if (first == 'p') {
     const TriMesh mesh = semblance::surfaces::ReadPly(bytes, "fuzz.ply");
-    if (semblance::surfaces::PlyVertexScalar(bytes, "x", "fuzz.ply").size() != mesh.points.size()) {
+    if (semblance::surfaces::ReadPlyVertexScalar(bytes, "x", "fuzz.ply").size() != mesh.points.size()) {
       std::abort();
     }
     const semblance::surfaces::MeshAttributes more = semblance::surfaces::ReadPlyAttributes(bytes, "fuzz.ply");

@@ -93,7 +93,7 @@ TEST_F(FaceCommands, ExportsExactAndTriangulatedFaces) {
 TEST_F(FaceCommands, APlyContainsTheCurvaturesOfTheSurface) {
   ExpectDone("export face.json --to coarse.ply --chord_mm 2");
   const auto scalar = [&](const char* name) {
-    return PlyVertexScalar(Bytes("coarse.ply"), name, "coarse.ply");
+    return ReadPlyVertexScalar(Bytes("coarse.ply"), name, "coarse.ply");
   };
   const std::vector<double> mean = scalar("scalar_mean_curvature_per_mm"),
                             gaussian = scalar("scalar_gaussian_curvature_per_mm2");

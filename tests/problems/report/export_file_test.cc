@@ -99,7 +99,7 @@ TEST_F(ExportFile, ARunBecomesAGlbWithSkullFaceAndDowels) {
   pugi::xml_document vtp;
   ASSERT_TRUE(vtp.load_string(Export(run / "face.ply", ".vtp").c_str()));
   for (const char* name : {"error_mm", "origin", "sigma_mm"}) {
-    const std::vector<double> in_ply = PlyVertexScalar(ply, std::string("scalar_") + name, "ply");
+    const std::vector<double> in_ply = ReadPlyVertexScalar(ply, std::string("scalar_") + name, "ply");
     const std::vector<double> in_vtp = Values(vtp, name);
     ASSERT_EQ(in_vtp.size(), in_ply.size()) << name;
     for (std::size_t v = 0; v < in_ply.size(); ++v) {
@@ -133,7 +133,7 @@ TEST_F(ExportFile, AMeshIsExportedToEveryMeshFormat) {
   pugi::xml_document vtu;
   ASSERT_TRUE(vtu.load_string(Export(sphere, ".vtu").c_str()));
   EXPECT_EQ(Values(vtu, "height_mm"),
-            PlyVertexScalar(ReadFileBytes(sphere), "scalar_height_mm", ""));
+            ReadPlyVertexScalar(ReadFileBytes(sphere), "scalar_height_mm", ""));
   EXPECT_EQ(DocumentOf(Export(sphere, ".glb"))["nodes"][0]["name"], "sphere");
 }
 

@@ -191,11 +191,11 @@ TEST(MeshReaders, AScalarOfAPlyIsReadInEveryForm) {
   const TriMesh plate = Plate(10, 1);
   MeshAttributes attributes;
   attributes.scalars = {{"a", {1, 2, 3, 4}}, {"depth", {0.5, -1, kNaN, 1e30f}}};
-  const auto values = PlyVertexScalar(EncodeMesh(plate, ".ply", attributes), "depth", "a.ply");
+  const auto values = ReadPlyVertexScalar(EncodeMesh(plate, ".ply", attributes), "depth", "a.ply");
   EXPECT_THAT(values, ::testing::Pointwise(::testing::NanSensitiveDoubleEq(),
                                            {0.5, -1., kNaN, static_cast<double>(1e30f)}));
-  EXPECT_EQ(PlyVertexScalar(kTextPly, "y", "a.ply"), (std::vector<double>{0, 0, 1}));
-  EXPECT_THAT([&] { PlyVertexScalar(kTextPly, "q", "a.ply"); },
+  EXPECT_EQ(ReadPlyVertexScalar(kTextPly, "y", "a.ply"), (std::vector<double>{0, 0, 1}));
+  EXPECT_THAT([&] { ReadPlyVertexScalar(kTextPly, "q", "a.ply"); },
               ::testing::ThrowsMessage<InputError>("a.ply: a vertex has no 'q'; it has x, y, z"));
 }
 
