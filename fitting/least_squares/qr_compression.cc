@@ -29,7 +29,7 @@ void Triangulate(Eigen::Index rows, Eigen::Index unknowns, Eigen::MatrixXd& slab
 }
 
 // The top unknowns x (unknowns + 3) of the triangulated [A | B].
-Eigen::MatrixXd Triangle(const Eigen::MatrixXd& a, const Rows3& b) {
+Eigen::MatrixXd UpperTriangle(const Eigen::MatrixXd& a, const Rows3& b) {
   const Eigen::Index n = a.cols();
   Eigen::MatrixXd slab(std::min(a.rows(), std::max(kSlab, 2 * n)), n + 3);
   Eigen::Index filled = 0;
@@ -66,7 +66,7 @@ LinearRows CompressRows(const Eigen::MatrixXd& a, const Rows3& b) {
   if (a.rows() <= a.cols()) {
     return {.a = a, .b = b};
   }
-  const Eigen::MatrixXd triangle = Triangle(a, b);
+  const Eigen::MatrixXd triangle = UpperTriangle(a, b);
   return TruncateRank({.a = triangle.leftCols(a.cols()), .b = triangle.rightCols<3>()});
 }
 

@@ -19,7 +19,7 @@ namespace semblance::problems {
 namespace {
 
 // Keeps one vertex per cell of a grid.
-TriMesh ClusterVertices(const TriMesh& mesh, double cell_mm) {
+TriMesh ClusterForView(const TriMesh& mesh, double cell_mm) {
   std::map<std::array<long, 3>, std::int32_t> of_cell;
   std::vector<std::int32_t> to(mesh.points.size());
   TriMesh out;
@@ -52,7 +52,7 @@ TriMesh SimplifyForView(const TriMesh& mesh, int most_triangles) {
     return Decimate(mesh, {.target_triangles = most_triangles}).mesh;
   } catch (const InputError&) {  // a scan may hold edges that Decimate refuses
     // The cell edge for about most_triangles on a smooth surface. It need not be exact.
-    return ClusterVertices(mesh, std::sqrt(2.3 * Area(mesh) / most_triangles));
+    return ClusterForView(mesh, std::sqrt(2.3 * Area(mesh) / most_triangles));
   }
 }
 
