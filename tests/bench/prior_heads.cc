@@ -81,7 +81,7 @@ void Measure(const std::string& head, const std::string& variant, StageCache& ca
 }  // namespace semblance::problems
 
 int main(int argc, char** argv) {
-  using namespace semblance;
+  using namespace semblance::problems;
   try {
     StageCache cache(16, std::make_shared<DiskCache>(
                              std::filesystem::temp_directory_path() / "semblance_prior_heads",

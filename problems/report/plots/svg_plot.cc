@@ -83,7 +83,7 @@ std::string Box(const BoxRow& row, const Axis& axis, double y) {
   svg += Line(axis.At(s.median), y - 9, axis.At(s.median), y + 9, "#0b5c8f", 3);
   for (std::size_t k = 0; k < row.values.size(); ++k) {
     const std::string name = k < row.names.size() ? row.names[k] + ": " : "";
-    svg += semblance::svg::Dot(axis.At(row.values[k]), y, 4,
+    svg += problems::svg::Dot(axis.At(row.values[k]), y, 4,
                                fmt::format("{}{:.6g}", name, row.values[k]));
   }
   return svg;
@@ -188,7 +188,7 @@ std::string RankPlotSvg(std::vector<RankedLabel> treatments, double critical_dif
     }
     svg += fmt::format(
         "<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"6\" fill=\"#0b5c8f\">{}</circle>\n", at(rank), y,
-        semblance::svg::Title(fmt::format("{}: mean rank {:.3f}", treatments[n].label, rank)));
+        problems::svg::Title(fmt::format("{}: mean rank {:.3f}", treatments[n].label, rank)));
   }
   return svg + "</svg>\n";
 }
