@@ -140,4 +140,4 @@ int Main(int argc, char** argv) {
 
 }  // namespace semblance::problems
 
-int main(int argc, char** argv) { return problems::Main(argc, argv); }
+int main(int argc, char** argv) { return semblance::problems::Main(argc, argv); }

@@ -33,7 +33,7 @@ TemplateFace InSubjectFrame(const TemplateFace& generic, const Similarity& face_
   placed.surface = Transformed(generic.surface, face_from_template);
   for (TemplateFeature& feature : placed.features) {
     if (feature.region) {
-      feature.region = Transformed(*feature.region, face_from_template);
+      feature.region = TransformedSphere(*feature.region, face_from_template);
     }
   }
   return placed;

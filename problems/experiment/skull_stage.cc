@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "problems/io/manifest.h"
+#include "surfaces/base/encoding.h"
 #include "problems/experiment/dowel_placement.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/extra_dowels.h"

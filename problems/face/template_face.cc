@@ -161,7 +161,7 @@ std::vector<Sphere> TemplateMasks(const TemplateFace& face) {
   return masks;
 }
 
-Sphere Transformed(const Sphere& sphere, const Similarity& to_from) {
+Sphere TransformedSphere(const Sphere& sphere, const Similarity& to_from) {
   return {to_from * sphere.center, to_from.scale * sphere.radius_mm};
 }
 

@@ -97,6 +97,6 @@ std::vector<VertexId> FeatureVertices(const TemplateFace& face);
 std::vector<Sphere> TemplateMasks(const TemplateFace& face);
 
 // The image of a sphere under a similarity.
-Sphere Transformed(const Sphere& sphere, const Similarity& to_from);
+Sphere TransformedSphere(const Sphere& sphere, const Similarity& to_from);
 
 }  // namespace semblance::problems

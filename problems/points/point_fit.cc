@@ -197,18 +197,18 @@ FootMoves MoveUv(const PointTable& table, std::span<const Triangle> triangles,
   return moved.moves;
 }
 
-struct PlacedPoints {
+struct PreparedPoints {
   Parametrisation parameters;
   std::optional<FootMoves> moves = {};
 };
 
-PlacedPoints PlacePoints(PointTable& table, const PointFitOptions& options, StepClock& step,
+PreparedPoints PlacePoints(PointTable& table, const PointFitOptions& options, StepClock& step,
                          const RunContext& context) {
   if (const std::string fault = ClosureFault(options); !fault.empty()) {
     throw InputError("closure: " + fault);
   }
   const std::vector<Triangle> triangles = std::exchange(table.triangles, {});
-  PlacedPoints placed{step("parameters", [&] { return FindParameters(table, triangles, options); }),
+  PreparedPoints placed{step("parameters", [&] { return FindParameters(table, triangles, options); }),
                       {}};
   if (RelaxationRounds(options.fit) > 0) {
     placed.moves = step("relaxation", [&] {
@@ -399,7 +399,7 @@ void ConvertWeights(std::span<const Term> terms, FitResult& fit) {
   }
 }
 
-PointFit BeginResult(PlacedPoints placed, FitResult fit, std::vector<PointAttribute> attributes) {
+PointFit BeginResult(PreparedPoints placed, FitResult fit, std::vector<PointAttribute> attributes) {
   const Parametrisation& parameters = placed.parameters;
   return {.parameters = std::string(
               EnumNames(parameters.source)[static_cast<std::size_t>(parameters.source)]),
@@ -452,7 +452,7 @@ std::optional<ToleranceReport> CompareWithTolerance(const PointFitOptions& optio
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context) {
   std::vector<PointAttribute> attributes = TakeAttributes(table, options);
   StepClock step(context);
-  PlacedPoints placed = PlacePoints(table, options, step, context);
+  PreparedPoints placed = PlacePoints(table, options, step, context);
   std::vector<Vec2>& uv = placed.parameters.uv;
   const HSplineSurface start = StartSurface(ShapeFor(options), table.positions, uv);
   CheckChord(options.chord_mm, start, {table.positions, uv}, context);

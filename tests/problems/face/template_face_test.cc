@@ -189,7 +189,7 @@ TEST(TemplateFace, FeatureRegionsHoldTheirParts) {
 
 TEST(TemplateFace, ASphereIsCarriedBySimilarity) {
   const Similarity s{.scale = 2, .rotation = Mat3::Identity(), .translation = {1, 2, 3}};
-  const Sphere placed = Transformed(Sphere{{1, 1, 1}, 4}, s);
+  const Sphere placed = TransformedSphere(Sphere{{1, 1, 1}, 4}, s);
   EXPECT_EQ(placed.center, Vec3(3, 4, 5));
   EXPECT_EQ(placed.radius_mm, 8);
 }
