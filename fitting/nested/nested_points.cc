@@ -58,7 +58,7 @@ double Extent(std::span<const Vec3> positions) {
 
 // The principal axes along which some displacement exceeds round-off; at least one.
 Eigen::Matrix<double, 3, Eigen::Dynamic> PrincipalAxes(const NestedPoints& points, double extent) {
-  constexpr double kRounding = 1e-12;  // relative to the extent
+  constexpr double kRelativeRounding = 1e-12;  // relative to the extent
   Mat3 moments = Mat3::Zero();
   for (const Vec3& d : points.value) {
     moments += d * d.transpose();
@@ -69,7 +69,7 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> PrincipalAxes(const NestedPoints& point
     largest = largest.cwiseMax((all.transpose() * d).cwiseAbs());
   }
   int channels = 1;
-  while (channels < 3 && largest[2 - channels] > kRounding * extent) {
+  while (channels < 3 && largest[2 - channels] > kRelativeRounding * extent) {
     ++channels;
   }
   return all.rightCols(channels);

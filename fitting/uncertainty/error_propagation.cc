@@ -141,6 +141,8 @@ class NoiseSink final : public RowSink {
   Eigen::MatrixX3d sum_;
 };
 
+}  // namespace
+
 // A point of the surface as a weighted sum of the unknowns.
 struct PointRow {
   std::vector<int> index;
@@ -151,8 +153,6 @@ struct PointRow {
     weight.assign(stencil.weight.begin(), stencil.weight.begin() + stencil.count);
   }
 };
-
-}  // namespace
 
 struct ErrorPropagation::Model {
   HSplineSurface surface;

@@ -44,14 +44,14 @@ std::vector<MeshPoint> ClosestPoints(const std::vector<Vec3>& points, const Simi
 // points.
 Similarity PlaceByClosestPoints(const std::vector<Vec3>& samples, Similarity mean_from_template,
                                 const MeshQuery& query, const RunContext& context) {
-  constexpr int kRounds = 10;         // more cost time
+  constexpr int kFootRounds = 10;         // more cost time
   constexpr double kFarMm = 5;        // pairs that are farther apart do not count
   constexpr std::size_t kEvery = 29;  // every 29th sample is enough to place the template
   std::vector<Vec3> some;
   for (std::size_t k = 0; k < samples.size(); k += kEvery) {
     some.push_back(samples[k]);
   }
-  for (int round = 0; round < kRounds; ++round) {
+  for (int round = 0; round < kFootRounds; ++round) {
     std::vector<Vec3> from, to;
     const std::vector<MeshPoint> closest = ClosestPoints(some, mean_from_template, query, context);
     for (std::size_t k = 0; k < some.size(); ++k) {

@@ -19,9 +19,9 @@ namespace {
 
 // The least-squares fit of one level's plain B-spline to a grid of samples of the formula.
 ControlNet FitFormula(const HSplineShape& shape, int level) {
-  constexpr int kSamplesPerPatch = 6;  // along each side; more cost time
-  const DomainGrid grid{kSamplesPerPatch * shape.PatchesU(level) + 1,
-                        kSamplesPerPatch * shape.PatchesV(level) + 1};
+  constexpr int kGridPerPatch = 6;  // along each side; more cost time
+  const DomainGrid grid{kGridPerPatch * shape.PatchesU(level) + 1,
+                        kGridPerPatch * shape.PatchesV(level) + 1};
   std::vector<Vec3> samples;
   for (std::size_t k = 0; k < grid.size(); ++k) {
     const Vec2 uv = grid.UvAt(k);

@@ -106,11 +106,11 @@ void NoteUnorderedRows(const TissueTable& table, Sex sex, std::span<const std::s
 
 void SetDepth(const TissueTable& table, const TissueDepth& depth, double sds, Dowel& dowel,
               FillNotes& notes) {
-  constexpr double kMinDepth_mm = 0.5;  // a depth of 0 or less would put skin inside bone
+  constexpr double kLeastDepth_mm = 0.5;  // a depth of 0 or less would put skin inside bone
   dowel.depth_mm = depth.mean_mm;
   dowel.sd_mm = depth.sd_mm.value_or(kNaN);
   if (sds != 0 && depth.sd_mm) {
-    dowel.depth_mm = std::max(depth.mean_mm + sds * *depth.sd_mm, kMinDepth_mm);
+    dowel.depth_mm = std::max(depth.mean_mm + sds * *depth.sd_mm, kLeastDepth_mm);
   }
   if (depth.flag == CellFlag::kSuspect) {
     notes.Add(dowel.site,

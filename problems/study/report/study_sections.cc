@@ -480,7 +480,7 @@ std::vector<double> Gains(const Probe& probe, const Probe& floor) {
 }
 
 ReportTable RanksTable(const std::vector<Probe>& probes, int gallery) {
-  constexpr int kLeastSubjects = 6;  // five cannot reach p < 0.05 in a two-sided test
+  constexpr int kMinSubjects = 6;  // five cannot reach p < 0.05 in a two-sided test
   ReportTable table{fmt::format("Ranks in a gallery of {}; by chance the mean is {}", gallery,
                                 ChanceRank(gallery)),
                     {"face", "rank 1", "rank 5", "mean rank", "gained over the floor",
@@ -491,7 +491,7 @@ ReportTable RanksTable(const std::vector<Probe>& probes, int gallery) {
     const std::vector<double> ranks = probe.Ranks(), gains = Gains(probe, floor);
     const SampleSummary gain = Summarize(gains);
     const bool is_floor = &probe == &floor;
-    const double p = !is_floor && gain.n >= kLeastSubjects ? Wilcoxon(gains).p : kNaN;
+    const double p = !is_floor && gain.n >= kMinSubjects ? Wilcoxon(gains).p : kNaN;
     table.AddRow(probe.label, Share(ranks, gallery, 1), Share(ranks, gallery, 5),
                  Summarize(ranks).mean, is_floor ? kNaN : gain.mean,
                  is_floor ? "" : IntervalText(gain.mean_95), TableNumber(p, 4));
