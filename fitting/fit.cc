@@ -413,7 +413,8 @@ FitResult Fit(const HSplineSurface& start, const FitTarget& target,
 FitResult Fit(const HSplineSurface& start, const ScatteredPoints& points, const FitOptions& options,
               const RunContext& context) {
   if (!IsAlone(options)) {
-    return Fit(start, MakeFitTarget(points.positions, points.uv, points.weights), {}, options, context);
+    return Fit(start, MakeFitTarget(points.positions, points.uv, points.weights), {}, options,
+               context);
   }
   CheckFit(start, points, options);
   return FitAlone(start, points, std::get<AutoPlan>(options.plan), context);

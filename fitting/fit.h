@@ -23,9 +23,9 @@ namespace semblance::fitting {
 //     get back its offsets. The first overload uses start. With `rest`, a caller can fit part of a
 //     schedule, seed dowels on the result (seeding.h) and continue.
 //   features: vertices of levels >= 1 to protect; may be empty.
-// Throws InputError for a target without points or as CheckTarget does, for options that FindFitFaults
-// refuses (fit_check.h), for a feature of level 0, and for a template without extent; Cancelled
-// between solves.
+// Throws InputError for a target without points or as CheckTarget does, for options that
+// FindFitFaults refuses (fit_check.h), for a feature of level 0, and for a template without extent;
+// Cancelled between solves.
 FitResult Fit(const HSplineSurface& start, const FitTarget& target,
               std::span<const VertexId> features, const FitOptions& options,
               const RunContext& context);

@@ -186,8 +186,8 @@ void FaceJob::LoadTemplateAndPrior() {
     return cache_.Get<TemplateFace>(StageKey("template", source),
                                     [&source] { return LoadTemplate(source); });
   });
-  prior_ =
-      step_("load prior", [&] { return LoadExperimentPrior(experiment_, *generic_, cache_, context_); });
+  prior_ = step_("load prior",
+                 [&] { return LoadExperimentPrior(experiment_, *generic_, cache_, context_); });
   Append(TemplateFiles(source), subject_.inputs);
   Append(prior_ ? PriorFiles(experiment_.prior) : InputPaths(), subject_.inputs);
 }

@@ -7,12 +7,12 @@
 #include <string>
 #include <vector>
 
-#include "problems/face/bust/pose_bust.h"
-#include "problems/experiment/metrics/face_details.h"
 #include "problems/experiment/case.h"
 #include "problems/experiment/depth_comparison.h"
+#include "problems/experiment/metrics/face_details.h"
 #include "problems/experiment/skull_stage.h"
 #include "problems/experiment/uncertainty.h"
+#include "problems/face/bust/pose_bust.h"
 #include "problems/face/hspline_prior.h"
 #include "surfaces/hspline_query/tessellate.h"
 

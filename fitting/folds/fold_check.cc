@@ -97,7 +97,8 @@ class Prober {
 
   // Groups the samples of a neighbourhood that are connected in space by links up to link_mm long.
   // Group 0 is that of the sample itself.
-  std::array<int, kNearWithItself> ClustersOf(const PointNeighbourhood& probe, double link_mm) const {
+  std::array<int, kNearWithItself> ClustersOf(const PointNeighbourhood& probe,
+                                              double link_mm) const {
     std::array<int, kNearWithItself> cluster;
     cluster.fill(-1);
     int count = 0;

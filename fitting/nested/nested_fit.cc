@@ -63,8 +63,8 @@ namespace {
 using Residual = NestedResidual;
 using Indices = std::vector<std::uint32_t>;
 
-// The constants were chosen on the point sets of docs/explanation/fit.md, "How good it is" (`fit_bench
-// untuned`), unless a line states another reason.
+// The constants were chosen on the point sets of docs/explanation/fit.md, "How good it is"
+// (`fit_bench untuned`), unless a line states another reason.
 
 constexpr int kMaxRounds = 24;  // bounds the loop, which normally ends by Refine
 // The smallest sample, and its points per vertex. Smaller samples save time in the first rounds;

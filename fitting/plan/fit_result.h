@@ -20,9 +20,9 @@ struct FitResult {
   std::vector<Vec2> uv = {};                        // per point of the target, after relaxation
   std::vector<double> residual_mm = {};  // per point of the target: distance of the final surface
                                          // at its (u,v)
-  double point_rms_mm = kNaN;  // of all points, weighted, after features were restored
-  double dowel_rms_mm = kNaN;  // of the points that are no seeds (seeding.h), weighted
-  int restored_features = -1;  // offsets that got their template's value back, or kept it
+  double point_rms_mm = kNaN;            // of all points, weighted, after features were restored
+  double dowel_rms_mm = kNaN;            // of the points that are no seeds (seeding.h), weighted
+  int restored_features = -1;            // offsets that got their template's value back, or kept it
   std::optional<AutoReport> automatic = {};  // assumptions of the auto plan
   bool usable = false;                       // whether every step has a solution
 };

@@ -58,7 +58,7 @@ void CheckShapePoints(std::span<const ShapePoint> shape) {
 }  // namespace
 
 FitTarget MakeFitTarget(std::span<const Vec3> positions, std::span<const Vec2> uv,
-                   std::span<const double> weights) {
+                        std::span<const double> weights) {
   CheckSizes({positions, uv, weights});
   FitTarget target;
   target.points.reserve(positions.size());

@@ -66,7 +66,7 @@ struct ScatteredPoints {
 // Makes a target of scattered points without labels. weights: one per point, or empty for equal
 // weights. Throws InputError if the sizes differ.
 FitTarget MakeFitTarget(std::span<const Vec3> positions, std::span<const Vec2> uv,
-                   std::span<const double> weights = {});
+                        std::span<const double> weights = {});
 
 // Throws InputError that names the point if a point has a position that is not finite, a (u,v)
 // outside the domain, a weight that is not positive and finite, or a foot without a unit direction;

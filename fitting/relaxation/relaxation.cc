@@ -326,7 +326,7 @@ std::optional<NetworkMoves> EffectiveMoves(const Relaxation& relaxation) {
 }
 
 DowelMesh MakeNetwork(const HSplineSurface& rest, const FitTarget& target,
-                    const NetworkMoves& moves) {
+                      const NetworkMoves& moves) {
   std::vector<Vec2> uv;
   for (const FitPoint& p : target.points) {
     uv.push_back(p.uv);

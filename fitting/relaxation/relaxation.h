@@ -147,7 +147,8 @@ std::optional<NetworkMoves> EffectiveMoves(const Relaxation& relaxation);
 
 // Makes the network of the points in the template. It has links only if the barrier or a weight
 // needs them.
-DowelMesh MakeNetwork(const HSplineSurface& rest, const FitTarget& target, const NetworkMoves& moves);
+DowelMesh MakeNetwork(const HSplineSurface& rest, const FitTarget& target,
+                      const NetworkMoves& moves);
 
 // Mean penalties without their weights, mm^2. a and b are neighbours, and d is their distance in
 // the template.

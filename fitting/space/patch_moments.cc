@@ -213,7 +213,8 @@ Matrix16 GramOfPoints(std::span<const CloudPoint> points, const PatchId& patch,
   Matrix16 gram = Matrix16::Zero();
   for (std::size_t k = 0; k < points.size(); ++k) {
     const VertexWeights weights = WeightsAt(points[k], patch);
-    gram.noalias() += points[k].weight() * FactorMoments(factors, k) * weights * weights.transpose();
+    gram.noalias() +=
+        points[k].weight() * FactorMoments(factors, k) * weights * weights.transpose();
   }
   return gram;
 }

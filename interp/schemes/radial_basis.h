@@ -28,11 +28,11 @@ struct RadialBasis {
 template <class Visitor>
 void Fields(Visitor& visit, RadialBasis& o) {
   visit(
-      FieldInfo{
-          .name = "kernel",
-          .doc = "function of the distance r between dowel and vertex: r (linear), r^3 (cubic), "
-                 "exp(-(r/width)^2) (gaussian), or Wendland's compact C2 function, 0 from r = "
-                 "width on; r^2 log r is not among them, as it is right in the plane only"},
+      FieldInfo{.name = "kernel",
+                .doc =
+                    "function of the distance r between dowel and vertex: r (linear), r^3 (cubic), "
+                    "exp(-(r/width)^2) (gaussian), or Wendland's compact C2 function, 0 from r = "
+                    "width on; r^2 log r is not among them, as it is right in the plane only"},
       o.kernel);
   visit(FieldInfo{.name = "width_mm",
                   .unit = "mm",

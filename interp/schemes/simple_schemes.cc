@@ -88,8 +88,9 @@ struct WeightedSums {
   }
 };
 
-std::vector<WeightedSums> SumsAlong(const DepthInput& input, const std::vector<DepthSample>& samples,
-                            double power, const RunContext& run) {
+std::vector<WeightedSums> SumsAlong(const DepthInput& input,
+                                    const std::vector<DepthSample>& samples, double power,
+                                    const RunContext& run) {
   std::vector<WeightedSums> sums(input.skull.points.size());
   ForEachGeodesic(InverseDistance::kName, input.skull, samples, run,
                   [&](std::size_t k, const std::vector<double>& distance) {

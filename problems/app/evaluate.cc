@@ -7,10 +7,10 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/experiment/case.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/run.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"

@@ -11,13 +11,13 @@
 #include <vector>
 
 #include "problems/app/exit_code.h"
+#include "problems/app/work_options.h"
 #include "problems/config/config.h"
 #include "problems/face/edit_script.h"
-#include "problems/report/export_file.h"
+#include "problems/face/hspline_prior.h"
 #include "problems/face/template_source.h"
 #include "problems/io/given_files.h"
-#include "problems/face/hspline_prior.h"
-#include "problems/app/work_options.h"
+#include "problems/report/export_file.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/feature.h"

@@ -9,12 +9,12 @@
 #include <utility>
 #include <vector>
 
+#include "problems/app/work_options.h"
 #include "problems/config/config.h"
 #include "problems/config/config_binder.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
-#include "problems/app/work_options.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {

@@ -12,11 +12,11 @@
 #include <string>
 #include <vector>
 
+#include "problems/app/all_commands.h"
 #include "problems/app/command_tree.h"
 #include "problems/app/exit_code.h"
-#include "problems/app/shell_completion.h"
-#include "problems/app/all_commands.h"
 #include "problems/app/program_end.h"
+#include "problems/app/shell_completion.h"
 
 namespace semblance::problems {
 namespace {
@@ -44,7 +44,9 @@ struct ShellArguments {
   std::string shell;
 };
 
-CommandNode WholeProgram(const ShellArguments& a) { return MakeCommandTree(*a.command->get_parent()); }
+CommandNode WholeProgram(const ShellArguments& a) {
+  return MakeCommandTree(*a.command->get_parent());
+}
 
 int Print(const std::string& text) {
   std::fputs(text.c_str(), stdout);

@@ -11,14 +11,14 @@
 #include <string>
 
 #include "problems/app/exit_code.h"
-#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/app/work_options.h"
 #include "problems/io/output_folder.h"
 #include "problems/io/staged_folder.h"
-#include "problems/subject/phantom_ct.h"
-#include "problems/app/work_options.h"
-#include "problems/subject/phantom.h"
 #include "problems/io/volumes/itk_files.h"
 #include "problems/io/volumes/read_volume.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/subject/phantom.h"
+#include "problems/subject/phantom_ct.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

@@ -12,12 +12,12 @@
 
 #include "problems/app/exit_code.h"
 #include "problems/app/shard.h"
+#include "problems/app/work_options.h"
 #include "problems/config/terminal_text.h"
 #include "problems/io/given_files.h"
 #include "problems/io/output_folder.h"
 #include "problems/population/population_result.h"
 #include "problems/population/population_run.h"
-#include "problems/app/work_options.h"
 
 namespace semblance::problems {
 namespace {

@@ -18,26 +18,26 @@
 #include <utility>
 #include <vector>
 
-#include "problems/app/exit_code.h"
-#include "problems/io/volumes/import_ct.h"
-#include "problems/experiment/input_files.h"
-#include "problems/io/output_folder.h"
-#include "problems/io/staged_folder.h"
-#include "problems/experiment/case.h"
-#include "problems/experiment/experiment_config.h"
-#include "problems/experiment/stage_cache.h"
-#include "problems/points/point_fit.h"
-#include "problems/population/population_file.h"
 #include "problems/app/evaluate.h"
+#include "problems/app/exit_code.h"
 #include "problems/app/program_end.h"
 #include "problems/app/work_options.h"
+#include "problems/experiment/case.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/experiment/input_files.h"
+#include "problems/experiment/stage_cache.h"
+#include "problems/io/output_folder.h"
+#include "problems/io/staged_folder.h"
+#include "problems/io/volumes/import_ct.h"
+#include "problems/io/volumes/read_volume.h"
+#include "problems/points/point_fit.h"
+#include "problems/population/population_file.h"
 #include "problems/report/alternatives.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_report.h"
 #include "problems/study/depth_study.h"
-#include "problems/study/study_plan.h"
 #include "problems/study/report/study_report.h"
-#include "problems/io/volumes/read_volume.h"
+#include "problems/study/study_plan.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
@@ -369,7 +369,8 @@ int ImportCtCommand(const Arguments& arguments) {
   fmt::print("folder: {}\n", root.string());
   if (!mr) {
     fmt::print(
-        "next: pick landmarks on skull.ply (3D Slicer, MeshLab, CloudCompare; docs/tutorial/first-face.md), "
+        "next: pick landmarks on skull.ply (3D Slicer, MeshLab, CloudCompare; "
+        "docs/tutorial/first-face.md), "
         "then\n  semblance landmarks convert PICKED {}\n",
         (folder.Root() / "landmarks.yaml").string());
   }

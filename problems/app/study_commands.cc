@@ -13,14 +13,14 @@
 
 #include "problems/app/exit_code.h"
 #include "problems/app/shard.h"
-#include "problems/study/report/comparison_files.h"
-#include "problems/study/report/study_comparison.h"
 #include "problems/config/terminal_text.h"
 #include "problems/io/staged_folder.h"
-#include "problems/study/study_run.h"
-#include "problems/study/study_submit.h"
+#include "problems/study/report/comparison_files.h"
+#include "problems/study/report/study_comparison.h"
 #include "problems/study/report/study_ranking.h"
 #include "problems/study/report/study_report.h"
+#include "problems/study/study_run.h"
+#include "problems/study/study_submit.h"
 
 namespace semblance::problems {
 namespace {

@@ -14,17 +14,17 @@
 #include <utility>
 #include <vector>
 
-#include "problems/face/bust/whole_head.h"
 #include "problems/app/exit_code.h"
-#include "problems/face/template_source.h"
-#include "problems/report/pictures/template_summary.h"
-#include "problems/experiment/input_files.h"
-#include "problems/io/staged_folder.h"
+#include "problems/app/work_options.h"
 #include "problems/experiment/case.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/experiment/input_files.h"
+#include "problems/face/bust/whole_head.h"
 #include "problems/face/hspline_prior.h"
 #include "problems/face/recentre.h"
-#include "problems/app/work_options.h"
+#include "problems/face/template_source.h"
+#include "problems/io/staged_folder.h"
+#include "problems/report/pictures/template_summary.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 

@@ -17,10 +17,10 @@
 #include <vector>
 
 #include "problems/app/exit_code.h"
-#include "problems/io/output_folder.h"
 #include "problems/app/program_end.h"
-#include "problems/app/workbench/http_server.h"
 #include "problems/app/work_options.h"
+#include "problems/app/workbench/http_server.h"
+#include "problems/io/output_folder.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {

@@ -236,8 +236,6 @@ ValueFilter::ValueFilter(std::string_view text, std::span<const std::string> nam
 ValueFilter::~ValueFilter() = default;
 ValueFilter::ValueFilter(ValueFilter&&) noexcept = default;
 
-bool ValueFilter::Holds(const NamedValues& values) const {
-  return problems::Holds(*root_, values);
-}
+bool ValueFilter::Holds(const NamedValues& values) const { return problems::Holds(*root_, values); }
 
 }  // namespace semblance::problems

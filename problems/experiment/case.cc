@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <set>
 
+#include "problems/experiment/extra_dowels.h"
 #include "problems/subject/condition_depths.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
-#include "problems/experiment/extra_dowels.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_plan.h"
 #include "problems/subject/phantom.h"
@@ -217,8 +217,8 @@ Case StartCase(const SubjectData& data, const Experiment& experiment, const Mesh
   return subject;
 }
 
-// Keeps the dowels of the landmarks that the experiment uses, with noise if it wants some, and gives
-// them their depths. All dowels, before some are left out, decide what is scored.
+// Keeps the dowels of the landmarks that the experiment uses, with noise if it wants some, and
+// gives them their depths. All dowels, before some are left out, decide what is scored.
 void GiveDepths(const SubjectData& data, const Experiment& experiment, const MeshQuery& query,
                 Case& subject) {
   const TissueOptions tissue = WithSiteDepths(experiment, data.landmarks);

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "interp/dowels/dowel_network.h"
-#include "problems/experiment/metrics/face_details.h"
 #include "problems/experiment/experiment.h"
+#include "problems/experiment/metrics/face_details.h"
 #include "problems/subject/mirror.h"
 
 namespace semblance::problems {

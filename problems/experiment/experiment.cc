@@ -10,9 +10,9 @@
 #include <variant>
 
 #include "fitting/plan/fit_check.h"
-#include "problems/face/bust/bust_model.h"
 #include "problems/config/config_tree.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/face/bust/bust_model.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 

@@ -10,10 +10,10 @@
 #include <set>
 
 #include "interp/dowels/dowel_network.h"
-#include "problems/subject/condition_depths.h"
 #include "problems/config/spelling_suggestion.h"
-#include "problems/face/template_source.h"
 #include "problems/experiment/dowel_placement.h"
+#include "problems/face/template_source.h"
+#include "problems/subject/condition_depths.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 
@@ -307,8 +307,9 @@ std::vector<std::string> JoinNetwork(const NetworkPlan& plan, std::span<const Do
       case Insertion::kInside:
         break;
       case Insertion::kOutside:
-        notes.push_back(fmt::format(
-            "site {}: outside the dowel network, which got an area more there", DescribeSite(site)));
+        notes.push_back(
+            fmt::format("site {}: outside the dowel network, which got an area more there",
+                        DescribeSite(site)));
         break;
       case Insertion::kNone:
         notes.push_back(

@@ -11,18 +11,18 @@
 #include <memory>
 #include <sstream>
 
-#include "problems/face/bust/bust_model.h"
-#include "problems/subject/condition_depths.h"
-#include "problems/face/edit_script.h"
-#include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/experiment/case.h"
+#include "problems/experiment/experiment_config.h"
 #include "problems/experiment/extra_dowels.h"
 #include "problems/experiment/make_face.h"
+#include "problems/face/bust/bust_model.h"
+#include "problems/face/edit_script.h"
 #include "problems/face/feature_rules.h"
 #include "problems/face/hspline_prior.h"
+#include "problems/subject/condition_depths.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/network_plan.h"
 #include "problems/subject/sites.h"
-#include "problems/experiment/experiment_config.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -137,13 +137,14 @@ void CheckMap(const DepthMap& map) {
 
 // The notes of a run on rules that do not apply.
 TextLines ExplainUnusedRules(const Experiment& experiment, const Case& subject, StageCache& loaded,
-                   const RunContext& context) {
+                             const RunContext& context) {
   std::shared_ptr<const LoadedPrior> prior;
   if (UsesPrior(WayToFace(experiment))) {
-    prior = LoadExperimentPrior(experiment, LoadTemplate(experiment.face_template), loaded, context);
+    prior =
+        LoadExperimentPrior(experiment, LoadTemplate(experiment.face_template), loaded, context);
   }
   return ExplainUnusedRules(experiment.rules, subject.points, subject.basis.sites.has_value(),
-                      prior ? &prior->face : nullptr);
+                            prior ? &prior->face : nullptr);
 }
 
 bool NamesAFile(const Experiment& experiment) {

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "problems/config/config_binder.h"
-#include "problems/io/given_files.h"
 #include "problems/experiment/experiment.h"
 #include "problems/experiment/stage_cache.h"
+#include "problems/io/given_files.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance::problems {

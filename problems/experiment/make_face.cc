@@ -12,13 +12,13 @@
 #include <type_traits>
 #include <utility>
 
-#include "problems/subject/condition_depths.h"
-#include "problems/face/edit_script.h"
-#include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/experiment/dowel_placement.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/face/edit_script.h"
 #include "problems/face/hspline_prior.h"
 #include "problems/face/prior_observations.h"
+#include "problems/subject/condition_depths.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/base/thin_plate.h"
@@ -509,8 +509,9 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
 }  // namespace
 
 std::shared_ptr<const LoadedPrior> LoadExperimentPrior(const Experiment& experiment,
-                                              const TemplateFace& generic, StageCache& cache,
-                                              const RunContext& context) {
+                                                       const TemplateFace& generic,
+                                                       StageCache& cache,
+                                                       const RunContext& context) {
   if (!UsesPrior(WayToFace(experiment))) {
     return nullptr;
   }

@@ -60,8 +60,9 @@ struct MadeFace {
 // The prior of the experiment, laid on its template; null if its face does not use one. Throws as
 // LoadPrior and LayOnTemplate do.
 std::shared_ptr<const LoadedPrior> LoadExperimentPrior(const Experiment& experiment,
-                                              const TemplateFace& generic, StageCache& cache,
-                                              const RunContext& context);
+                                                       const TemplateFace& generic,
+                                                       StageCache& cache,
+                                                       const RunContext& context);
 
 // The part of the implicit face that may be seeded. cuts: the planes at which the scan ends. Near
 // them the implicit face follows the rim and the lid of the shell and is no face. Adds a note for

@@ -9,11 +9,11 @@
 #include <string>
 #include <type_traits>
 
-#include "problems/io/manifest.h"
-#include "surfaces/base/encoding.h"
 #include "problems/experiment/dowel_placement.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/extra_dowels.h"
+#include "problems/io/manifest.h"
+#include "surfaces/base/encoding.h"
 
 namespace semblance::problems {
 namespace {

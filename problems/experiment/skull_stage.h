@@ -10,10 +10,10 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/io/disk_cache.h"
 #include "problems/experiment/case.h"
 #include "problems/experiment/stage_cache.h"
 #include "problems/experiment/step_clock.h"
+#include "problems/io/disk_cache.h"
 #include "problems/subject/mirror.h"
 #include "surfaces/implicit_face.h"
 #include "surfaces/mesh/cut_planes.h"

@@ -10,8 +10,8 @@
 
 #include "fitting/fit.h"
 #include "interp/evaluation/scores.h"
-#include "problems/experiment/metrics/face_region.h"
 #include "problems/experiment/experiment.h"
+#include "problems/experiment/metrics/face_region.h"
 #include "problems/experiment/skull_stage.h"
 #include "surfaces/hspline_query/tessellate.h"
 

@@ -44,7 +44,7 @@ std::vector<MeshPoint> ClosestPoints(const std::vector<Vec3>& points, const Simi
 // points.
 Similarity PlaceByClosestPoints(const std::vector<Vec3>& samples, Similarity mean_from_template,
                                 const MeshQuery& query, const RunContext& context) {
-  constexpr int kFootRounds = 10;         // more cost time
+  constexpr int kFootRounds = 10;     // more cost time
   constexpr double kFarMm = 5;        // pairs that are farther apart do not count
   constexpr std::size_t kEvery = 29;  // every 29th sample is enough to place the template
   std::vector<Vec3> some;

@@ -12,8 +12,8 @@
 
 #include "fitting/problem/fit_target.h"
 #include "problems/face/domain_grid.h"
-#include "problems/face/template_face.h"
 #include "problems/face/face_prior.h"
+#include "problems/face/template_face.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance::problems {

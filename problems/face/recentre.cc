@@ -108,9 +108,10 @@ FacePrior WithSites(FacePrior prior, const std::map<std::string, Vec3>& sites) {
 double MedianMove(const FacePrior& before, const FacePrior& after) {
   std::vector<double> moves;
   for (const auto& [site, at] : after.sites) {
-    moves.push_back((FindPosition(at, after.model.mean, after.model.mean.points) -
-                     FindPosition(before.sites.at(site), before.model.mean, before.model.mean.points))
-                        .norm());
+    moves.push_back(
+        (FindPosition(at, after.model.mean, after.model.mean.points) -
+         FindPosition(before.sites.at(site), before.model.mean, before.model.mean.points))
+            .norm());
   }
   return UpperMedian(moves);
 }

@@ -7,9 +7,9 @@
 #include <vector>
 
 #include "interp/dowels/dowel.h"
-#include "problems/face/template_face.h"
 #include "problems/face/face_prior.h"
 #include "problems/face/hspline_prior.h"
+#include "problems/face/template_face.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance::problems {

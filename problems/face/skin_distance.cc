@@ -17,8 +17,8 @@
 namespace semblance::problems {
 namespace {
 
-// Normals within 60 degrees (docs/experiments/real-heads.md). A smaller cosine matches more of the skin that
-// the face meets aslant, but also more of the walls of nostrils and lids.
+// Normals within 60 degrees (docs/experiments/real-heads.md). A smaller cosine matches more of the
+// skin that the face meets aslant, but also more of the walls of nostrils and lids.
 constexpr double kLeastCosine = 0.5;
 
 // The middles of the cells of a columns x rows grid over the domain, i + columns * j.

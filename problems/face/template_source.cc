@@ -171,7 +171,8 @@ std::vector<TemplateFeature> ParseFeatures(const Json& json) {
 
 std::map<std::string, Vec2> ParseSites(const std::string& text, const std::filesystem::path& path) {
   CsvReader csv(text, path.string());
-  const std::size_t site = csv.RequireColumn("site"), u = csv.RequireColumn("u"), v = csv.RequireColumn("v");
+  const std::size_t site = csv.RequireColumn("site"), u = csv.RequireColumn("u"),
+                    v = csv.RequireColumn("v");
   std::map<std::string, Vec2> sites;
   while (csv.NextRow()) {
     const std::string code(csv.Cell(site));

@@ -12,11 +12,11 @@
 #include <utility>
 
 #include "problems/config/config.h"
-#include "problems/report/plots/svg_plot.h"
 #include "problems/points/fit_maps.h"
 #include "problems/points/fit_picture.h"
 #include "problems/points/fit_report.h"
 #include "problems/report/plain_names.h"
+#include "problems/report/plots/svg_plot.h"
 #include "problems/report/report_kit.h"
 
 namespace semblance::problems {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "problems/report/pictures/colour_map.h"
 #include "problems/points/fit_maps.h"
+#include "problems/report/pictures/colour_map.h"
 
 namespace semblance::problems {
 

@@ -203,13 +203,13 @@ struct PreparedPoints {
 };
 
 PreparedPoints PlacePoints(PointTable& table, const PointFitOptions& options, StepClock& step,
-                         const RunContext& context) {
+                           const RunContext& context) {
   if (const std::string fault = ClosureFault(options); !fault.empty()) {
     throw InputError("closure: " + fault);
   }
   const std::vector<Triangle> triangles = std::exchange(table.triangles, {});
-  PreparedPoints placed{step("parameters", [&] { return FindParameters(table, triangles, options); }),
-                      {}};
+  PreparedPoints placed{
+      step("parameters", [&] { return FindParameters(table, triangles, options); }), {}};
   if (RelaxationRounds(options.fit) > 0) {
     placed.moves = step("relaxation", [&] {
       return MoveUv(table, triangles, options, context, placed.parameters.uv);

@@ -197,8 +197,8 @@ void CompareWithMean(std::vector<PredictedSites>& ways) {
 }  // namespace
 
 std::vector<PredictedSites> LeaveOneOut(const PopulationFile& file,
-                                   const std::vector<CountedSubject>& subjects,
-                                   const JointSample& sample) {
+                                        const std::vector<CountedSubject>& subjects,
+                                        const JointSample& sample) {
   constexpr Index kMinSubjects = 3;
   std::vector<PredictedSites> result;
   if (sample.values.rows() < kMinSubjects) {

@@ -40,7 +40,7 @@ struct PredictedSites {
 // two subjects are known to differ in a covariate, `known` and `person_known` if no known site
 // varies. The result is empty with fewer than three subjects.
 std::vector<PredictedSites> LeaveOneOut(const PopulationFile& file,
-                                   const std::vector<CountedSubject>& subjects,
-                                   const JointSample& sample);
+                                        const std::vector<CountedSubject>& subjects,
+                                        const JointSample& sample);
 
 }  // namespace semblance::problems

@@ -9,11 +9,11 @@
 #include <utility>
 
 #include "interp/evaluation/scores.h"
+#include "problems/population/depth_modes.h"
 #include "problems/report/pictures/image.h"
 #include "problems/report/pictures/pictures.h"
 #include "problems/report/plots/heat_map.h"
 #include "problems/report/plots/svg_plot.h"
-#include "problems/population/depth_modes.h"
 #include "problems/report/report_kit.h"
 #include "problems/subject/sites.h"
 

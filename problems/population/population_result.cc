@@ -38,8 +38,8 @@ std::vector<CountedSubject> Counted(const PopulationResult& result) {
 // Notes where outliers were not searched, which differs from finding none.
 void NoteUnsearchedOutliers(PopulationResult& result) {
   if (!result.LooksForOutliers()) {
-    result.notes.push_back(
-        fmt::format("fewer than {} subjects: outliers are not searched for", kMinSubjectsForOutliers));
+    result.notes.push_back(fmt::format("fewer than {} subjects: outliers are not searched for",
+                                       kMinSubjectsForOutliers));
     return;
   }
   int sites = 0, skipped = 0;
@@ -47,8 +47,9 @@ void NoteUnsearchedOutliers(PopulationResult& result) {
     const bool is_site = IsSite(result.sample.names[j]);
     sites += is_site ? 1 : 0;
     skipped +=
-        is_site && result.sample.values.col(j).array().isFinite().count() < kMinSubjectsForOutliers ? 1
-                                                                                               : 0;
+        is_site && result.sample.values.col(j).array().isFinite().count() < kMinSubjectsForOutliers
+            ? 1
+            : 0;
   }
   if (skipped > 0) {
     result.notes.push_back(fmt::format(

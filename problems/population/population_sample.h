@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "problems/subject/joint_normal.h"
 #include "problems/population/population_file.h"
 #include "problems/population/subject_depths.h"
+#include "problems/subject/joint_normal.h"
 #include "problems/subject/tissue_table.h"
 
 namespace semblance::problems {

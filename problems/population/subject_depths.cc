@@ -9,14 +9,14 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "problems/face/template_placement.h"
-#include "problems/subject/phantom_ct.h"
 #include "problems/experiment/case.h"
-#include "problems/subject/propose/propose_landmarks.h"
+#include "problems/face/skin_distance.h"
+#include "problems/face/template_placement.h"
 #include "problems/subject/average_skull.h"
 #include "problems/subject/landmark_mistakes.h"
+#include "problems/subject/phantom_ct.h"
+#include "problems/subject/propose/propose_landmarks.h"
 #include "problems/subject/sites.h"
-#include "problems/face/skin_distance.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
@@ -139,7 +139,7 @@ struct MarkedDepths {
 };
 
 MarkedDepths Propose(const SubjectData& data, const std::string& name,
-               std::span<const ReferenceHead> references, const RunContext& context) {
+                     std::span<const ReferenceHead> references, const RunContext& context) {
   if (references.empty()) {
     throw InputError(
         "it has no landmarks, and no reference skull has any from which they could be proposed; "

@@ -13,8 +13,8 @@
 #include <set>
 #include <utility>
 
-#include "problems/report/pictures/pictures.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/report/pictures/pictures.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/run_pictures.h"
 
@@ -252,7 +252,7 @@ class ComparedPictures {
 }  // namespace
 
 std::vector<NamedExperiment> MakeAlternatives(const Experiment& experiment, const fs::path& folder,
-                                            const ConfigNode& tree) {
+                                              const ConfigNode& tree) {
   Experiment own = experiment;
   own.alternatives.clear();
   const std::string text = WriteConfig(own);
@@ -283,8 +283,8 @@ std::vector<NamedExperiment> MakeAlternatives(const Experiment& experiment, cons
   return result;
 }
 
-CheckFindings CheckAlternatives(const std::vector<NamedExperiment>& named,
-                                 const CheckFindings& own, InputCheck& inputs) {
+CheckFindings CheckAlternatives(const std::vector<NamedExperiment>& named, const CheckFindings& own,
+                                InputCheck& inputs) {
   CheckFindings all;
   for (const auto& [name, experiment] : named) {
     const CheckFindings found = inputs.Look(experiment);

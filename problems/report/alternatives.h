@@ -8,8 +8,8 @@
 
 #include "problems/config/config_tree.h"
 #include "problems/experiment/input_files.h"
-#include "problems/io/output_folder.h"
 #include "problems/experiment/stage_cache.h"
+#include "problems/io/output_folder.h"
 #include "problems/run.h"
 
 namespace semblance::problems {
@@ -25,18 +25,18 @@ struct NamedExperiment {
 // fault of each alternative: a name that appears twice or cannot name a folder, a setting that does
 // not exist, another skull.
 std::vector<NamedExperiment> MakeAlternatives(const Experiment& experiment,
-                                            const std::filesystem::path& folder,
-                                            const ConfigNode& tree);
+                                              const std::filesystem::path& folder,
+                                              const ConfigNode& tree);
 
 // Checks the inputs of the alternatives. Returns the findings that `own`, the findings of the
 // experiment itself, does not hold. Each line names its alternative.
-CheckFindings CheckAlternatives(const std::vector<NamedExperiment>& named,
-                                 const CheckFindings& own, InputCheck& inputs);
+CheckFindings CheckAlternatives(const std::vector<NamedExperiment>& named, const CheckFindings& own,
+                                InputCheck& inputs);
 
-// Runs each alternative of `named` (from MakeAlternatives) and writes it into alternatives/NAME below
-// the folder, as WriteRun does. Stages that an alternative shares with the run come from `cache`.
-// Then writes for the report of the run, with the run's own answer first and all pictures under one
-// camera:
+// Runs each alternative of `named` (from MakeAlternatives) and writes it into alternatives/NAME
+// below the folder, as WriteRun does. Stages that an alternative shares with the run come from
+// `cache`. Then writes for the report of the run, with the run's own answer first and all pictures
+// under one camera:
 // - alternatives.json: the changed options, the errors if the truth is known, how far each face
 // lies
 //   outside the run's own, the landmarks and the run's own sites that have no dowel, and notes;

@@ -8,7 +8,6 @@
 #include <utility>
 #include <vector>
 
-#include "surfaces/mesh/mesh_primitives.h"
 #include "problems/report/view/view_mesh.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
@@ -17,6 +16,7 @@
 #include "surfaces/base/lower_case.h"
 #include "surfaces/hspline_files/face_export.h"
 #include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/mesh/mesh_primitives.h"
 #include "surfaces/mesh_files/glb.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"

@@ -7,10 +7,10 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "problems/face/bust/bust_files.h"
-#include "problems/experiment/metrics/face_metrics.h"
-#include "problems/io/manifest.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/experiment/metrics/face_metrics.h"
+#include "problems/face/bust/bust_files.h"
+#include "problems/io/manifest.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_pictures.h"
 #include "problems/report/run_report.h"

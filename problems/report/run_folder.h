@@ -5,8 +5,8 @@
 #include <array>
 #include <string_view>
 
-#include "problems/io/output_folder.h"
 #include "problems/experiment/experiment.h"
+#include "problems/io/output_folder.h"
 #include "problems/run.h"
 
 namespace semblance::problems {

@@ -7,8 +7,8 @@
 #include "problems/io/output_folder.h"
 #include "problems/report/pictures/colour_map.h"
 #include "problems/report/pictures/render.h"
-#include "problems/subject/mirror.h"
 #include "problems/run.h"
+#include "problems/subject/mirror.h"
 
 namespace semblance::problems {
 

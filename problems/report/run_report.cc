@@ -8,8 +8,8 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/config/config.h"
-#include "problems/report/plots/svg_plot.h"
 #include "problems/report/plain_names.h"
+#include "problems/report/plots/svg_plot.h"
 #include "problems/report/report_kit.h"
 #include "problems/report/run_pictures.h"
 #include "problems/report/scene_json.h"

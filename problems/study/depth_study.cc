@@ -8,8 +8,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "problems/report/pictures/pictures.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/report/pictures/pictures.h"
 #include "problems/report/result_json.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/csv.h"

@@ -12,9 +12,9 @@
 #include <vector>
 
 #include "interp/evaluation/cross_validation.h"
+#include "problems/experiment/depth_comparison.h"
 #include "problems/io/output_folder.h"
 #include "problems/report/pictures/colour_map.h"
-#include "problems/experiment/depth_comparison.h"
 
 namespace semblance::problems {
 

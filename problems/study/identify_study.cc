@@ -7,8 +7,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "problems/face/template_source.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/face/template_source.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "surfaces/base/error.h"
@@ -154,7 +154,7 @@ IdentifyResult Identify(const Experiment& experiment, const std::vector<GalleryE
   const std::string key = GalleryKey(gallery);
   const auto ceiling = cache.Get<Distances>(fmt::format("ceiling {}\n{}", own, key), [&] {
     return Compare(SimulateRescan((*faces)[own], options.ceiling_cell_mm, options.ceiling_noise_mm,
-                             options.random_seed + own),
+                                  options.random_seed + own),
                    *faces, context);
   });
   // The distances of the generic face are the same for all persons; only the rank depends on `own`.

@@ -261,7 +261,8 @@ std::string Preference::TargetSuffix() const {
 }
 
 Preference PreferenceFor(const std::string& metric, std::optional<Better> given) {
-  return {.better = given.value_or(DefaultBetter(metric)), .target = StatedShare(metric).value_or(0)};
+  return {.better = given.value_or(DefaultBetter(metric)),
+          .target = StatedShare(metric).value_or(0)};
 }
 
 }  // namespace semblance::problems

@@ -41,8 +41,9 @@ struct Preference {
   // target.
   double Compared(double value) const;
   bool IsBetter(double compared, double than) const;  // for two results of Compared
-  std::string ToPhrase() const;                        // "nearest to 0.9 is better"
-  std::string TargetSuffix() const;  // suffix to the metric: ", distance from 0.9", or "" unless kNearest
+  std::string ToPhrase() const;                       // "nearest to 0.9 is better"
+  std::string TargetSuffix()
+      const;  // suffix to the metric: ", distance from 0.9", or "" unless kNearest
 };
 
 // Takes `given` (the user's choice) or the default of the metric. The target is that of the metric:

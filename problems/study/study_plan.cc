@@ -12,10 +12,10 @@
 
 #include "problems/config/config_reader.h"
 #include "problems/config/value_filter.h"
+#include "problems/experiment/experiment_config.h"
 #include "problems/experiment/input_files.h"
 #include "problems/io/file_hashes.h"
 #include "problems/io/manifest.h"
-#include "problems/experiment/experiment_config.h"
 #include "problems/study/study_metrics.h"
 #include "surfaces/base/encoding.h"
 

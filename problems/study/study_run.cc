@@ -79,10 +79,10 @@
 #include <system_error>
 #include <thread>
 
+#include "problems/experiment/experiment_config.h"
 #include "problems/experiment/input_files.h"
 #include "problems/io/file_hashes.h"
 #include "problems/io/manifest.h"
-#include "problems/experiment/experiment_config.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/scene_json.h"

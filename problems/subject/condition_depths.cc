@@ -97,7 +97,8 @@ JointNormal ReadDistribution(const TissueOptions& options) {
 // The known values that the distribution can use. A known site may be unknown to the table, which
 // gives a note; an unknown covariate is an error.
 std::vector<KnownValue> UsableValues(const TissueGiven& given, const JointNormal& joint,
-                                     const std::map<std::string, double>& depths, ConditionNotes& notes) {
+                                     const std::map<std::string, double>& depths,
+                                     ConditionNotes& notes) {
   std::vector<KnownValue> known;
   std::vector<std::string> unused;
   for (const auto& [site, depth_mm] : depths) {
@@ -123,7 +124,8 @@ std::vector<KnownValue> UsableValues(const TissueGiven& given, const JointNormal
 }
 
 // Notes known values that are far from those of all subjects of the table.
-void NoteFarValues(const JointNormal& joint, const std::vector<KnownValue>& known, ConditionNotes& notes) {
+void NoteFarValues(const JointNormal& joint, const std::vector<KnownValue>& known,
+                   ConditionNotes& notes) {
   for (const KnownValue& value : known) {
     const int at = *joint.Find(value.name);
     const double mean = joint.mean[at], sd = joint.sd[at];

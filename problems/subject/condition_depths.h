@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "interp/dowels/dowel.h"
-#include "problems/subject/joint_normal.h"
 #include "problems/subject/dowel_depths.h"
+#include "problems/subject/joint_normal.h"
 #include "problems/subject/landmarks.h"
 
 namespace semblance::problems {

@@ -62,7 +62,8 @@ std::map<std::string, double>::const_iterator FindSet(const TissueOptions& optio
   return own != options.set_mm.end() ? own : options.set_mm.find(WithoutSide(site));
 }
 
-void NoteUnusedSets(const TissueOptions& options, const std::vector<Dowel>& dowels, FillNotes& notes) {
+void NoteUnusedSets(const TissueOptions& options, const std::vector<Dowel>& dowels,
+                    FillNotes& notes) {
   for (const auto& entry : options.set_mm) {
     const bool used = std::any_of(dowels.begin(), dowels.end(), [&](const Dowel& dowel) {
       const auto it = FindSet(options, dowel.site);
@@ -236,8 +237,8 @@ void FillFromMeasured(const LandmarkFile& file, const std::vector<Dowel*>& open,
                       "instead",
                       DescribeSite(dowel->site), dowel->depth_mm));
     } else {
-      notes.Add(dowel->site,
-                fmt::format("site {}: no measured depth; dowel dropped", DescribeSite(dowel->site)));
+      notes.Add(dowel->site, fmt::format("site {}: no measured depth; dowel dropped",
+                                         DescribeSite(dowel->site)));
     }
   }
 }

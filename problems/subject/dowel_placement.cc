@@ -141,7 +141,8 @@ Vec3 SnapToSkull(const LandmarkFile& file, const Landmark& landmark, const MeshP
     throw InputError(fmt::format(
         "{}: site {} is {:.1f} mm from the skull, and at most {} mm are allowed "
         "(max_distance_mm); correct its point, or check that landmarks and skull share one frame",
-        FileLabel(file), DescribeSite(landmark.site), nearest.distance_mm, options.max_distance_mm));
+        FileLabel(file), DescribeSite(landmark.site), nearest.distance_mm,
+        options.max_distance_mm));
   }
   return nearest.position;
 }
@@ -177,7 +178,7 @@ void AddNoise(const MeshQuery& skull, const PlaceOptions& options, UsedLandmarks
 }
 
 void NoteMissingNames(const LandmarksKept& kept, std::span<const std::string> sites,
-                       std::vector<std::string>& notes) {
+                      std::vector<std::string>& notes) {
   const auto* names = std::get_if<KeepNames>(&kept);
   for (const std::string& name : names ? names->sites : std::vector<std::string>()) {
     if (std::ranges::find(sites, name) == sites.end()) {

@@ -10,10 +10,10 @@
 #include <vector>
 
 #include "interp/dowels/dowel.h"
-#include "surfaces/mesh/mesh_primitives.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
+#include "surfaces/mesh/mesh_primitives.h"
 
 namespace semblance::problems {
 namespace {

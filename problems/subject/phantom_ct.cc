@@ -105,9 +105,10 @@ LostBone::LostBone(const Phantom& phantom, const BoneDefect& defect) {
   }
   const auto site = std::ranges::find(phantom.sites, defect.site, &PhantomSite::site);
   if (site == phantom.sites.end()) {
-    throw InputError(fmt::format(
-        "phantom: the head has no site '{}' to lose bone at; docs/reference/sites.md lists the sites",
-        defect.site));
+    throw InputError(
+        fmt::format("phantom: the head has no site '{}' to lose bone at; docs/reference/sites.md "
+                    "lists the sites",
+                    defect.site));
   }
   centre_ = site->base;
   radius_mm_ = defect.radius_mm;

@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "problems/subject/phantom.h"
 #include "problems/io/volumes/ct_volume.h"
+#include "problems/subject/phantom.h"
 
 namespace semblance::problems {
 

@@ -4,7 +4,7 @@
 // see each other.
 #pragma once
 
-namespace semblance::surfaces {}  // meshes, H-splines, implicit surfaces
+namespace semblance::surfaces {}  // namespace semblance::surfaces
 
 namespace semblance::interp {  // from a few depths to a depth field
 using namespace surfaces;

@@ -39,7 +39,8 @@ constexpr auto EnumNames(EmitterDepth) {
 
 // e(p) = (k+1)/(2 pi) l^k * integral over T of h / |p - q|^(k+3) dq. Over an infinite plane the
 // integral is 2 pi h^(-k) / (k+1). Hence coplanar triangles of one depth l sum to (l/h)^k, and
-// their surface is flat, at exactly the height l, for any mesh (docs/explanation/mathematics.md, 2).
+// their surface is flat, at exactly the height l, for any mesh (docs/explanation/mathematics.md,
+// 2).
 struct FlatEmitter {
   static constexpr std::string_view kName = "flat";
   double decay = 6;

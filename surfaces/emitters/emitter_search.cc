@@ -14,8 +14,8 @@ namespace {
 constexpr int kLanes = EmissionUpperBound::kLanes, kLeaf = 4;
 static_assert(kLanes == FlatEmitterLanes::kLanes && kLanes == DistanceEmitterLanes::kLanes);
 // Emitters are summed by multipoles only if this errs less than this share of leaving them out. A
-// larger share spends more of the error budget on multipoles (docs/explanation/mathematics.md, "The far
-// field").
+// larger share spends more of the error budget on multipoles (docs/explanation/mathematics.md, "The
+// far field").
 constexpr double kMaxErrorShare = 0.25;
 
 // Builds the tree. A leaf begins at a multiple of 4, and a larger node at a multiple of the lane

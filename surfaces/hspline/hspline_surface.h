@@ -49,7 +49,9 @@ class HSplineSurface {
   const HSplineShape& shape() const { return shape_; }
   int Columns(int level) const { return shape_.Columns(level); }
   int Rows(int level) const { return shape_.Rows(level); }
-  Vec2 GrevillePoint(const VertexId& vertex) const { return surfaces::GrevillePoint(shape_, vertex); }
+  Vec2 GrevillePoint(const VertexId& vertex) const {
+    return surfaces::GrevillePoint(shape_, vertex);
+  }
   Stencil StencilAt(int level, const Vec2& uv, DerivativeOrder order = {}) const {
     return surfaces::StencilAt(shape_, level, uv, order);
   }

@@ -173,8 +173,7 @@ void BalanceCells(const HSplineShape& shape, std::set<DomainCell>& cells) {
     }
     for (const auto& [i, j] : {std::pair{cell.i - 1, cell.j}, std::pair{cell.i + 1, cell.j},
                                std::pair{cell.i, cell.j - 1}, std::pair{cell.i, cell.j + 1}}) {
-      const DomainCell beside{cell.level,
-                              WrapIndex(shape.PatchesU(cell.level), i, shape.ClosedU()),
+      const DomainCell beside{cell.level, WrapIndex(shape.PatchesU(cell.level), i, shape.ClosedU()),
                               WrapIndex(shape.PatchesV(cell.level), j, false)};
       if (beside.i >= 0 && beside.j >= 0) {
         RefineAt(beside, cells, open);

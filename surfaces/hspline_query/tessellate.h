@@ -34,7 +34,7 @@ Tessellation TessellateToChord(const HSplineSurface& surface, double chord_mm, i
 // A cell is like a patch, but its level may exceed the surface's finest level.
 using DomainCell = PatchId;
 
-inline constexpr int kDeepestCell = 16;    // level of the smallest cells
+inline constexpr int kDeepestCell = 16;   // level of the smallest cells
 inline constexpr double kMaxCells = 1e7;  // per surface; bounds memory
 
 // The four quarters of a cell.

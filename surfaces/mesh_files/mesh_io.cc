@@ -65,7 +65,8 @@ Precision PrecisionFor(const TriMesh& mesh, double chord_mm) {
   return SingleStep(largest) > needed_mm ? Precision::kDouble : Precision::kSingle;
 }
 
-std::string MakePlyHeader(const TriMesh& mesh, const MeshAttributes& attributes, Precision precision) {
+std::string MakePlyHeader(const TriMesh& mesh, const MeshAttributes& attributes,
+                          Precision precision) {
   std::string header = "ply\nformat binary_little_endian 1.0\ncomment units mm, frame LPS\n";
   header += fmt::format("element vertex {0}\nproperty {1} x\nproperty {1} y\nproperty {1} z\n",
                         mesh.points.size(), precision == Precision::kDouble ? "double" : "float");

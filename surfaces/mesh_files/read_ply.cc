@@ -599,7 +599,7 @@ TriMesh ReadPly(std::string_view bytes, const std::string& name) {
 }
 
 std::vector<double> ReadPlyVertexScalar(std::string_view bytes, const std::string& scalar,
-                                    const std::string& name) {
+                                        const std::string& name) {
   PlyHeader header = ReadPlyHeader(bytes, name);
   PlyElement& vertex = FindElement(header, "vertex", name);
   const auto found = FindProperty(vertex, scalar);

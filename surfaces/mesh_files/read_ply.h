@@ -24,7 +24,7 @@ TriMesh ReadPly(std::string_view bytes, const std::string& name);
 // Reads the property `scalar` of every vertex, in order, of any number type; values may be NaN.
 // Throws InputError as ReadPly does, and if the vertices have no such property or it is a list.
 std::vector<double> ReadPlyVertexScalar(std::string_view bytes, const std::string& scalar,
-                                    const std::string& name);
+                                        const std::string& name);
 
 // Reads everything that the vertices carry beside x, y, z: nx, ny, nz as normals if all three
 // exist; red, green, blue as colours if all three are of type uchar; every other plain property as

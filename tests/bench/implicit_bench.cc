@@ -435,11 +435,16 @@ void Kernel() {
 int main(int count, char** arguments) {
   const std::vector<std::pair<std::string, void (*)()>> parts = {
       {"memory", semblance::problems::Memory},  // before others have needed any
-      {"thesis", semblance::problems::AgainstThesis},   {"par", semblance::problems::AtPar},
-      {"floor", semblance::problems::AgainstFloor},     {"growth", semblance::problems::Growth},
-      {"emitters", semblance::problems::EmitterGrowth}, {"threads", semblance::problems::TwoThreads},
-      {"cgal", semblance::problems::AgainstCgal},       {"skull", semblance::problems::RealSkull},
-      {"vtk", semblance::problems::AgainstVtk},         {"kernel", semblance::problems::Kernel}};
+      {"thesis", semblance::problems::AgainstThesis},
+      {"par", semblance::problems::AtPar},
+      {"floor", semblance::problems::AgainstFloor},
+      {"growth", semblance::problems::Growth},
+      {"emitters", semblance::problems::EmitterGrowth},
+      {"threads", semblance::problems::TwoThreads},
+      {"cgal", semblance::problems::AgainstCgal},
+      {"skull", semblance::problems::RealSkull},
+      {"vtk", semblance::problems::AgainstVtk},
+      {"kernel", semblance::problems::Kernel}};
   const std::vector<std::string> asked(arguments + 1, arguments + count);
   for (const auto& [name, run] : parts) {
     if (asked.empty() || std::find(asked.begin(), asked.end(), name) != asked.end()) {

@@ -14,8 +14,8 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/io/disk_cache.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/io/disk_cache.h"
 #include "problems/run.h"
 
 namespace semblance::problems {

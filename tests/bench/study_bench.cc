@@ -7,8 +7,8 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 
-#include "problems/study/study_run.h"
 #include "problems/study/report/study_report.h"
+#include "problems/study/study_run.h"
 #include "surfaces/base/atomic_file.h"
 
 namespace semblance::problems {

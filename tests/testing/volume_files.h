@@ -21,11 +21,11 @@
 #include <string>
 #include <vector>
 
+#include "problems/io/volumes/ct_volume.h"
 #include "problems/io/volumes/import_ct.h"
-#include "problems/subject/phantom_ct.h"
 #include "problems/io/volumes/itk_files.h"
 #include "problems/io/volumes/read_volume.h"
-#include "problems/io/volumes/ct_volume.h"
+#include "problems/subject/phantom_ct.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scratch_file.h"

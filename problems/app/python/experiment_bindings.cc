@@ -7,16 +7,16 @@
 #include <string>
 #include <vector>
 
-#include "problems/experiment/input_files.h"
-#include "problems/io/staged_folder.h"
-#include "problems/experiment/experiment_config.h"
 #include "problems/app/python/bindings.h"
 #include "problems/app/python/values.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/experiment/input_files.h"
+#include "problems/io/staged_folder.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/run.h"
-#include "problems/study/study_run.h"
 #include "problems/study/report/study_report.h"
+#include "problems/study/study_run.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {

@@ -5,10 +5,10 @@
 #include <stop_token>
 #include <utility>
 
-#include "problems/config/config.h"
-#include "problems/points/point_fit.h"
 #include "problems/app/python/bindings.h"
 #include "problems/app/python/values.h"
+#include "problems/config/config.h"
+#include "problems/points/point_fit.h"
 
 namespace semblance::problems {
 namespace {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/dowels/dowel_network.h"
 #include "interp/interpolate_depth.h"
-#include "problems/config/config.h"
 #include "problems/app/python/bindings.h"
 #include "problems/app/python/values.h"
+#include "problems/config/config.h"
 
 namespace semblance::problems {
 namespace {

@@ -3,9 +3,9 @@
 
 #include <memory>
 
-#include "problems/face/edit_script.h"
 #include "problems/app/python/bindings.h"
 #include "problems/app/python/values.h"
+#include "problems/face/edit_script.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_batch.h"

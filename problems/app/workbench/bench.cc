@@ -9,13 +9,13 @@
 #include <iterator>
 #include <utility>
 
-#include "problems/config/config.h"
-#include "problems/io/staged_folder.h"
-#include "problems/experiment/experiment_config.h"
-#include "problems/subject/propose/propose_landmarks.h"
-#include "problems/report/run_folder.h"
 #include "problems/app/workbench/bench_actions.h"
 #include "problems/app/workbench/bench_config.h"
+#include "problems/config/config.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/io/staged_folder.h"
+#include "problems/report/run_folder.h"
+#include "problems/subject/propose/propose_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"

@@ -86,14 +86,14 @@
 #include <utility>
 #include <vector>
 
-#include "problems/face/pull.h"
-#include "problems/subject/propose/reference_head.h"
 #include "problems/app/workbench/bench_checks.h"
 #include "problems/app/workbench/bench_faces.h"
 #include "problems/app/workbench/bench_folder.h"
 #include "problems/app/workbench/bench_job.h"
 #include "problems/app/workbench/bench_open.h"
 #include "problems/app/workbench/bench_subject.h"
+#include "problems/face/pull.h"
+#include "problems/subject/propose/reference_head.h"
 
 namespace semblance::problems {
 

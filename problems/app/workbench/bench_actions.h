@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "problems/experiment/experiment.h"
 #include "problems/app/workbench/bench_state.h"
+#include "problems/experiment/experiment.h"
 #include "surfaces/base/geometry.h"
 
 namespace semblance::problems {

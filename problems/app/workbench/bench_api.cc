@@ -13,14 +13,14 @@
 #include <optional>
 #include <stdexcept>
 
-#include "problems/config/config.h"
-#include "problems/subject/landmark_files/read_landmarks.h"
-#include "problems/report/pictures/site_picture.h"
-#include "problems/experiment/experiment_config.h"
-#include "problems/report/report_assets.h"
-#include "problems/app/workbench/bench_json.h"
 #include "problems/app/workbench/bench_actions.h"
 #include "problems/app/workbench/bench_assets.h"
+#include "problems/app/workbench/bench_json.h"
+#include "problems/config/config.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/report/pictures/site_picture.h"
+#include "problems/report/report_assets.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"

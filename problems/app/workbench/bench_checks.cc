@@ -8,9 +8,9 @@
 #include <optional>
 #include <utility>
 
-#include "problems/subject/mirror.h"
 #include "problems/subject/average_skull.h"
 #include "problems/subject/landmark_mistakes.h"
+#include "problems/subject/mirror.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <string_view>
 
+#include "problems/app/workbench/bench_state.h"
 #include "problems/config/config_tree.h"
 #include "problems/experiment/experiment.h"
-#include "problems/app/workbench/bench_state.h"
 
 namespace semblance::problems {
 

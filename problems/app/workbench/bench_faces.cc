@@ -7,10 +7,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/face/edit_script.h"
 #include "problems/experiment/case.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/make_face.h"
+#include "problems/face/edit_script.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"

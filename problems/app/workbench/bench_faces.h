@@ -11,10 +11,10 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/face/pull.h"
+#include "problems/app/workbench/bench_subject.h"
 #include "problems/experiment/case.h"
 #include "problems/experiment/stage_cache.h"
-#include "problems/app/workbench/bench_subject.h"
+#include "problems/face/pull.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance::problems {

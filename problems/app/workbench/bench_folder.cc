@@ -9,12 +9,12 @@
 #include <string_view>
 #include <system_error>
 
-#include "problems/config/config_tree.h"
-#include "problems/config/utf8_check.h"
-#include "problems/subject/landmark_files/read_landmarks.h"
-#include "problems/experiment/experiment_config.h"
 #include "problems/app/workbench/bench_assets.h"
 #include "problems/app/workbench/bench_config.h"
+#include "problems/config/config_tree.h"
+#include "problems/config/utf8_check.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 

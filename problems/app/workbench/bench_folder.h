@@ -15,9 +15,9 @@
 #include <string>
 #include <string_view>
 
-#include "problems/io/staged_folder.h"
-#include "problems/experiment/experiment.h"
 #include "problems/app/workbench/bench_state.h"
+#include "problems/experiment/experiment.h"
+#include "problems/io/staged_folder.h"
 
 namespace semblance::problems {
 

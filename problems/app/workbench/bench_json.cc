@@ -5,11 +5,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "problems/app/workbench/bench_config.h"
 #include "problems/report/site_page.h"
+#include "problems/report/view/view_mesh.h"
 #include "problems/subject/average_skull.h"
 #include "problems/subject/sites.h"
-#include "problems/report/view/view_mesh.h"
-#include "problems/app/workbench/bench_config.h"
 #include "surfaces/hspline_query/tessellate.h"
 
 namespace semblance::problems {

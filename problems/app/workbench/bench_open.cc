@@ -12,14 +12,14 @@
 #include <system_error>
 #include <utility>
 
-#include "problems/io/volumes/import_ct.h"
-#include "problems/subject/landmark_files/read_landmarks.h"
-#include "problems/io/output_folder.h"
-#include "problems/experiment/experiment_config.h"
-#include "problems/io/volumes/read_volume.h"
 #include "problems/app/workbench/bench_actions.h"
 #include "problems/app/workbench/bench_config.h"
 #include "problems/app/workbench/bench_subject.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/io/output_folder.h"
+#include "problems/io/volumes/import_ct.h"
+#include "problems/io/volumes/read_volume.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"

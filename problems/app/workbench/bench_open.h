@@ -10,8 +10,8 @@
 #include <string_view>
 #include <vector>
 
-#include "problems/experiment/experiment.h"
 #include "problems/app/workbench/bench_folder.h"
+#include "problems/experiment/experiment.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance::problems {

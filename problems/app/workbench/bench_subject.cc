@@ -6,13 +6,13 @@
 #include <algorithm>
 #include <initializer_list>
 
-#include "problems/subject/landmark_files/read_landmarks.h"
-#include "problems/io/output_folder.h"
-#include "problems/experiment/experiment_config.h"
-#include "problems/subject/phantom.h"
-#include "problems/report/view/view_mesh.h"
-#include "problems/io/volumes/read_volume.h"
 #include "problems/app/workbench/bench_actions.h"
+#include "problems/experiment/experiment_config.h"
+#include "problems/io/output_folder.h"
+#include "problems/io/volumes/read_volume.h"
+#include "problems/report/view/view_mesh.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"

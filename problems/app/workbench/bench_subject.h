@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "problems/experiment/experiment.h"
 #include "problems/app/workbench/bench_state.h"
+#include "problems/experiment/experiment.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {

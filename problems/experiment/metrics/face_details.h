@@ -13,10 +13,10 @@
 
 #include "fitting/terms/metric_distortion.h"
 #include "interp/dowels/dowel.h"
-#include "problems/face/template_face.h"
 #include "problems/experiment/metrics/face_metrics.h"
 #include "problems/experiment/metrics/face_region.h"
 #include "problems/experiment/metrics/protocols.h"
+#include "problems/face/template_face.h"
 #include "problems/subject/average_skull.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"

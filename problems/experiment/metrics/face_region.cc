@@ -104,8 +104,7 @@ std::vector<Sphere> ExcludedSpheres(const std::map<std::string, Vec3>& points,
   for (const ExcludedZone& zone : zones) {
     const auto point = points.find(zone.site);
     if (point == points.end()) {
-      throw InputError(
-          fmt::format("face region: excluded zone: {}", StandardSiteFault(zone.site)));
+      throw InputError(fmt::format("face region: excluded zone: {}", StandardSiteFault(zone.site)));
     }
     spheres.push_back({point->second, zone.radius_mm});
   }

@@ -73,7 +73,8 @@ std::vector<double> CumulativeMatch(std::span<const double> ranks, int gallery) 
   return shares;
 }
 
-FaceDistance MeasureFaceDistance(const ProbeFace& probe, const KnownFace& known, const RunContext& context) {
+FaceDistance MeasureFaceDistance(const ProbeFace& probe, const KnownFace& known,
+                                 const RunContext& context) {
   const CommonPoints common = Common(probe, known);
   const Similarity known_from_probe =
       PlaceTemplate(common.of_probe, common.of_known, {}, {.rotate = true, .scale = false});
@@ -83,7 +84,7 @@ FaceDistance MeasureFaceDistance(const ProbeFace& probe, const KnownFace& known,
 }
 
 ProbeFace SimulateRescan(const KnownFace& known, double cell_mm, double noise_mm,
-                    std::uint64_t random_seed) {
+                         std::uint64_t random_seed) {
   Random random(random_seed);
   ProbeFace again{.mesh = ClusterVertices(known.skin, cell_mm), .points = known.points};
   const std::vector<Vec3> normals = VertexNormals(again.mesh);

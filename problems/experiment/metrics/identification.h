@@ -52,12 +52,13 @@ struct FaceDistance {
 // The motion keeps the size, because size distinguishes people. The surface is placed by the
 // points, then by ScoreBestFit (protocols.h). Throws InputError if the two faces have fewer than
 // three common points or if no skin is scored.
-FaceDistance MeasureFaceDistance(const ProbeFace& probe, const KnownFace& known, const RunContext& context);
+FaceDistance MeasureFaceDistance(const ProbeFace& probe, const KnownFace& known,
+                                 const RunContext& context);
 
 // Simulates another scan of the true face. Vertices are clustered in cells of cell_mm (> 0). Then
 // each vertex moves at random along its normal, by noise_mm (>= 0) rms. The points move at random
 // in all directions, by noise_mm rms.
 ProbeFace SimulateRescan(const KnownFace& known, double cell_mm, double noise_mm,
-                    std::uint64_t random_seed);
+                         std::uint64_t random_seed);
 
 }  // namespace semblance::problems

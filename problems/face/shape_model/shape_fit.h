@@ -196,7 +196,7 @@ struct ShapeTarget {
   std::vector<double> surface_error_mm = {};  // its errors, for sigma; empty: surface_sd_mm
   std::vector<ShapeMark> marks = {};
   std::vector<std::uint64_t> draws = {};  // random seeds of shapes to draw
-  bool compute_spread = true;               // compute sigma and draws
+  bool compute_spread = true;             // compute sigma and draws
 };
 
 struct ShapeEstimate {

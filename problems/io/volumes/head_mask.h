@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "problems/io/volumes/voxel_mask.h"
 #include "problems/io/volumes/ct_volume.h"
+#include "problems/io/volumes/voxel_mask.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance::problems {

@@ -4,8 +4,8 @@
 
 #include <functional>
 
-#include "problems/io/volumes/head_mask.h"
 #include "problems/io/volumes/ct_volume.h"
+#include "problems/io/volumes/head_mask.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "problems/report/pictures/lighting.h"
-#include "surfaces/mesh/mesh_primitives.h"
 #include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_primitives.h"
 
 namespace semblance::problems {
 SceneObject SkullObject(TriMesh mesh) {

@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
-#include "surfaces/mesh/mesh_primitives.h"
 #include "problems/report/pictures/pictures.h"
 #include "surfaces/hspline_query/tessellate.h"
+#include "surfaces/mesh/mesh_primitives.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {

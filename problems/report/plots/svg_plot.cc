@@ -84,7 +84,7 @@ std::string Box(const BoxRow& row, const Axis& axis, double y) {
   for (std::size_t k = 0; k < row.values.size(); ++k) {
     const std::string name = k < row.names.size() ? row.names[k] + ": " : "";
     svg += problems::svg::Dot(axis.At(row.values[k]), y, 4,
-                               fmt::format("{}{:.6g}", name, row.values[k]));
+                              fmt::format("{}{:.6g}", name, row.values[k]));
   }
   return svg;
 }

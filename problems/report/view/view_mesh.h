@@ -45,8 +45,8 @@ class SceneBlobs {
 // The blob that AddMesh adds.
 nlohmann::ordered_json EncodeMeshBlob(const TriMesh& mesh);
 
-// The inverse of EncodeMeshBlob. A coordinate is off by half a step at most. Throws InputError, or an
-// exception of the JSON library, if the blob is not a mesh.
+// The inverse of EncodeMeshBlob. A coordinate is off by half a step at most. Throws InputError, or
+// an exception of the JSON library, if the blob is not a mesh.
 TriMesh DecodeMeshBlob(const nlohmann::ordered_json& blob);
 
 }  // namespace semblance::problems

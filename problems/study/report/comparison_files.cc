@@ -19,7 +19,9 @@ std::string FullLabel(const ComparedTreatment& treatment) {
   return fmt::format("{}: {}", treatment.study, treatment.label);
 }
 
-std::string Direction(const StudyComparison& comparison) { return comparison.preference.ToPhrase(); }
+std::string Direction(const StudyComparison& comparison) {
+  return comparison.preference.ToPhrase();
+}
 
 ReportTable TreatmentTable(const StudyComparison& comparison) {
   ReportTable table{

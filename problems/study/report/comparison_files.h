@@ -4,8 +4,8 @@
 
 #include <string>
 
-#include "problems/study/report/study_comparison.h"
 #include "problems/io/output_folder.h"
+#include "problems/study/report/study_comparison.h"
 
 namespace semblance::problems {
 

@@ -58,8 +58,8 @@ struct CompareOptions {
   std::optional<Better> better;  // none: CommonPreference
 };
 
-// The direction in which the studies that use this metric rank it. DefaultBetter if no study uses it.
-// Throws InputError if the studies contradict each other.
+// The direction in which the studies that use this metric rank it. DefaultBetter if no study uses
+// it. Throws InputError if the studies contradict each other.
 Better CommonPreference(std::span<const NamedStudy* const> studies, const std::string& metric);
 
 // Pairs each treatment of a later study with the one of the same label in the first study, else

@@ -10,15 +10,15 @@
 #include <string>
 #include <vector>
 
-#include "problems/report/plots/svg_plot.h"
 #include "problems/report/plain_names.h"
+#include "problems/report/plots/svg_plot.h"
 #include "problems/report/report_kit.h"
 #include "problems/report/scene_json.h"
 #include "problems/study/depth_study.h"
-#include "problems/study/trial_folder.h"
 #include "problems/study/report/results_sqlite.h"
 #include "problems/study/report/study_ranking.h"
 #include "problems/study/report/study_sections.h"
+#include "problems/study/trial_folder.h"
 #include "surfaces/base/parallel.h"
 
 namespace semblance::problems {

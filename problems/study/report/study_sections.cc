@@ -11,9 +11,9 @@
 
 #include "problems/config/value_filter.h"
 #include "problems/experiment/metrics/identification.h"
+#include "problems/report/plain_names.h"
 #include "problems/report/plots/heat_map.h"
 #include "problems/report/plots/svg_plot.h"
-#include "problems/report/plain_names.h"
 #include "problems/study/report/study_ranking.h"
 #include "surfaces/base/geometry.h"
 
@@ -431,7 +431,7 @@ struct Probe {
 
 // The metric of a treatment's trials.
 SectionBySubject CollectMetric(const StudyResults& results, const Treatment& treatment,
-                        const std::string& metric) {
+                               const std::string& metric) {
   SectionBySubject values;
   for (const std::size_t n : treatment.trials) {
     const TrialRow& row = results.trials[n];

@@ -192,7 +192,8 @@ class Proposer {
     proposal_.skull_from_average = fit.skull_from_average;
     const Vec3 left = fit.skull_from_average.rotation.col(0);
     const bool exchanged = std::ranges::any_of(proposal_.sites, [&](const ProposedSite& s) {
-      const auto other = std::ranges::find(proposal_.sites, MirroredSite(s.site), &ProposedSite::site);
+      const auto other =
+          std::ranges::find(proposal_.sites, MirroredSite(s.site), &ProposedSite::site);
       return SideOfSite(s.site) == Side::kLeft && other != proposal_.sites.end() &&
              left.dot(s.point - other->point) <= 0;
     });

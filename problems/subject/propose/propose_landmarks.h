@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "problems/subject/landmarks.h"
 #include "problems/subject/propose/reference_head.h"
 #include "problems/subject/propose/skull_pose.h"
-#include "problems/subject/landmarks.h"
 #include "surfaces/base/run_context.h"
 
 namespace semblance::problems {

@@ -61,7 +61,8 @@ struct ExtremumSearch {
   bool Counts(std::size_t v) const {
     constexpr double kMinCosine = 0.3;  // 72 degrees
     const Vec3 d = skull.mesh.points[v] - predicted;
-    return d.norm() <= 1.5 * reach_mm && skull.surface.vertex_normals()[v].dot(normal) > kMinCosine &&
+    return d.norm() <= 1.5 * reach_mm &&
+           skull.surface.vertex_normals()[v].dot(normal) > kMinCosine &&
            (!midline || std::abs(left.dot(d)) <= kHalfMidline_mm);
   }
 };

@@ -81,7 +81,8 @@ std::vector<ShellMatch> MatchBothWays(const ShellPair& pair, const Similarity& p
 double Misfit_mm(const std::vector<ShellMatch>& matches) {
   std::vector<double> distances_mm;
   for (const ShellMatch& m : matches) {
-    distances_mm.push_back(std::fmin(m.distance_mm, kMaxDistance_mm));  // the latter without a match
+    distances_mm.push_back(
+        std::fmin(m.distance_mm, kMaxDistance_mm));  // the latter without a match
   }
   std::ranges::sort(distances_mm);
   distances_mm.resize(static_cast<std::size_t>(kKept * static_cast<double>(matches.size())));

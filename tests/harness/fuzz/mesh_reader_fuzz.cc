@@ -20,10 +20,12 @@ TriMesh Read(std::string_view bytes) {
   const char first = bytes.empty() ? 'p' : bytes.front();
   if (first == 'p') {
     const TriMesh mesh = semblance::surfaces::ReadPly(bytes, "fuzz.ply");
-    if (semblance::surfaces::ReadPlyVertexScalar(bytes, "x", "fuzz.ply").size() != mesh.points.size()) {
+    if (semblance::surfaces::ReadPlyVertexScalar(bytes, "x", "fuzz.ply").size() !=
+        mesh.points.size()) {
       std::abort();
     }
-    const semblance::surfaces::MeshAttributes more = semblance::surfaces::ReadPlyAttributes(bytes, "fuzz.ply");
+    const semblance::surfaces::MeshAttributes more =
+        semblance::surfaces::ReadPlyAttributes(bytes, "fuzz.ply");
     for (const auto& scalar : more.scalars) {
       if (scalar.values.size() != mesh.points.size()) {
         std::abort();

@@ -11,10 +11,10 @@
 #include <vector>
 
 #include "problems/config/value_filter.h"
+#include "problems/points/point_table.h"
 #include "problems/subject/landmark_files/landmark_table.h"
 #include "problems/subject/landmark_files/markups_json.h"
 #include "problems/subject/landmark_files/point_files.h"
-#include "problems/points/point_table.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/npy.h"
 #include "surfaces/hspline_files/hspline_json.h"
@@ -47,9 +47,11 @@ void ReadArray(std::string_view bytes) {
 }
 
 void ReadSurface(std::string_view bytes) {
-  const semblance::problems::HSplineSurface surface = semblance::problems::HSplineFromJson(bytes, "fuzz");
+  const semblance::problems::HSplineSurface surface =
+      semblance::problems::HSplineFromJson(bytes, "fuzz");
   const std::string text = semblance::problems::HSplineToJson(surface);
-  Require(semblance::problems::HSplineToJson(semblance::problems::HSplineFromJson(text, "fuzz")) == text);
+  Require(semblance::problems::HSplineToJson(semblance::problems::HSplineFromJson(text, "fuzz")) ==
+          text);
 }
 
 void CheckFinite(const LandmarkFile& file) {

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "problems/face/template_source.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/face/template_source.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
@@ -132,7 +132,8 @@ TEST(Experiment, ThePublishedWayIsOneBaseAway) {
   EXPECT_TRUE(std::holds_alternative<RestoreFeatures>(published.fit.features));
   EXPECT_TRUE(std::holds_alternative<NoRelaxation>(published.fit.relaxation));
   EXPECT_EQ(published.seeds.weight, 1);
-  const std::vector<ScheduleStep> steps = PlanSteps(published.fit.plan), thesis = PublishedSchedule();
+  const std::vector<ScheduleStep> steps = PlanSteps(published.fit.plan),
+                                  thesis = PublishedSchedule();
   ASSERT_EQ(steps.size(), thesis.size());
   for (std::size_t k = 0; k < steps.size(); ++k) {
     EXPECT_EQ(steps[k].level, thesis[k].level);

@@ -6,8 +6,8 @@
 
 #include "fitting/relaxation/dowel_mesh.h"
 #include "fitting/relaxation/relaxation.h"
-#include "problems/face/edit_script.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/face/edit_script.h"
 #include "problems/run.h"
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"

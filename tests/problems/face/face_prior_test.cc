@@ -11,9 +11,9 @@
 #include <functional>
 #include <string>
 
-#include "problems/face/template_source.h"
 #include "problems/face/hspline_prior.h"
 #include "problems/face/prior_observations.h"
+#include "problems/face/template_source.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
@@ -305,8 +305,9 @@ TEST(DomainGrid, SurfaceThroughItsOwnSamplesIsTheSurface) {
     EXPECT_LT((again.Point(grid.UvAt(k)) - samples[k]).norm(), 0.05);
     EXPECT_EQ(grid.NearestTo(grid.UvAt(k)), k);
   }
-  EXPECT_THAT(testing::WordsOf<InputError>([] { MakeDomainGrid({.closure = Closure::kPeriodicU}); }),
-              HasSubstr("needs one that is open"));
+  EXPECT_THAT(
+      testing::WordsOf<InputError>([] { MakeDomainGrid({.closure = Closure::kPeriodicU}); }),
+      HasSubstr("needs one that is open"));
 }
 
 TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {

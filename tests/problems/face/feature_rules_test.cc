@@ -7,8 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "problems/face/template_source.h"
 #include "problems/face/hspline_prior.h"
+#include "problems/face/template_source.h"
 #include "problems/subject/average_skull.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/shapes.h"

@@ -5,8 +5,8 @@
 
 #include <cmath>
 
-#include "problems/face/template_source.h"
 #include "problems/face/hspline_prior.h"
+#include "problems/face/template_source.h"
 
 namespace semblance::problems {
 namespace {

@@ -7,8 +7,8 @@
 #include <chrono>
 #include <thread>
 
-#include "problems/io/manifest.h"
 #include "problems/experiment/skull_stage.h"
+#include "problems/io/manifest.h"
 #include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"

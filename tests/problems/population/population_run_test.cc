@@ -12,11 +12,11 @@
 #include <utility>
 
 #include "problems/config/config.h"
-#include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/experiment/metrics/statistics.h"
 #include "problems/population/population_report.h"
 #include "problems/population/population_result.h"
 #include "problems/subject/dowel_depths.h"
+#include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/phantom.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"

@@ -137,9 +137,9 @@ TEST(Alternatives, LieBelowTheRunAndListLeftOutSites) {
   StageCache cache(16);
   RunResult own = problems::Run(experiment, {}, &cache);
   own.implicit.notes = {"of the implicit face"};
-  EXPECT_THAT(
-      RunAlternatives(experiment, MakeAlternatives(experiment, kConfigs, {}), own, cache, folder, {}),
-      ElementsAre());
+  EXPECT_THAT(RunAlternatives(experiment, MakeAlternatives(experiment, kConfigs, {}), own, cache,
+                              folder, {}),
+              ElementsAre());
   const auto json = nlohmann::json::parse(ReadFileBytes(scratch / "out/alternatives.json"));
   ASSERT_EQ(json.size(), 3u);
   EXPECT_THAT(json[1]["left_out"], Contains("iM2_l"));  // missing from that table

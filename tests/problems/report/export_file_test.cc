@@ -99,7 +99,8 @@ TEST_F(ExportFile, ARunBecomesAGlbWithSkullFaceAndDowels) {
   pugi::xml_document vtp;
   ASSERT_TRUE(vtp.load_string(Export(run / "face.ply", ".vtp").c_str()));
   for (const char* name : {"error_mm", "origin", "sigma_mm"}) {
-    const std::vector<double> in_ply = ReadPlyVertexScalar(ply, std::string("scalar_") + name, "ply");
+    const std::vector<double> in_ply =
+        ReadPlyVertexScalar(ply, std::string("scalar_") + name, "ply");
     const std::vector<double> in_vtp = Values(vtp, name);
     ASSERT_EQ(in_vtp.size(), in_ply.size()) << name;
     for (std::size_t v = 0; v < in_ply.size(); ++v) {

@@ -8,8 +8,8 @@
 #include <regex>
 
 #include "problems/report/pictures/image.h"
-#include "problems/report/plots/svg_parts.h"
 #include "problems/report/plain_names.h"
+#include "problems/report/plots/svg_parts.h"
 #include "problems/report/report_assets.h"
 #include "surfaces/base/error.h"
 

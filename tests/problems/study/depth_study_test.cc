@@ -9,9 +9,9 @@
 #include <nlohmann/json.hpp>
 
 #include "problems/experiment/experiment_config.h"
-#include "problems/study/study_run.h"
 #include "problems/study/report/study_report.h"
 #include "problems/study/report/study_sections.h"
+#include "problems/study/study_run.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"

@@ -9,8 +9,8 @@
 #include <cmath>
 #include <set>
 
-#include "problems/study/study_run.h"
 #include "problems/study/report/study_report.h"
+#include "problems/study/study_run.h"
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_folder.h"
 

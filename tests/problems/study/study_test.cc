@@ -8,9 +8,9 @@
 
 #include "problems/config/config.h"
 #include "problems/run.h"
+#include "problems/study/report/study_report.h"
 #include "problems/study/study_metrics.h"
 #include "problems/study/study_run.h"
-#include "problems/study/report/study_report.h"
 #include "surfaces/base/atomic_file.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"

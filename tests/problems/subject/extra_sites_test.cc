@@ -62,8 +62,9 @@ TEST(ExtraSites, AFaultIsOneLine) {
 }
 
 TEST(ExtraSites, ANameThatIsNoSiteNeedsAPlace) {
-  EXPECT_THAT(SiteOptionFaults(Read("n: {uv: [0, 1]}, mine: {near: n, depth: 3}, mmb_l: {near: pg}")),
-              IsEmpty());
+  EXPECT_THAT(
+      SiteOptionFaults(Read("n: {uv: [0, 1]}, mine: {near: n, depth: 3}, mmb_l: {near: pg}")),
+      IsEmpty());
   const auto fault = [](const std::string& text) {
     const std::vector<OptionFault> faults = SiteOptionFaults(Read(text));
     return faults.size() == 1 ? faults[0].path + ": " + faults[0].what : "";

@@ -4,8 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "problems/config/config.h"
 #include "problems/app/workbench/bench_state.h"
+#include "problems/config/config.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {

@@ -12,9 +12,9 @@
 #include <thread>
 #include <tuple>
 
-#include "problems/subject/phantom.h"
 #include "problems/app/workbench/bench.h"
 #include "problems/app/workbench/bench_actions.h"
+#include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"

@@ -12,9 +12,9 @@
 #include <map>
 #include <thread>
 
+#include "problems/app/workbench/bench_actions.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/run.h"
-#include "problems/app/workbench/bench_actions.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"

@@ -100,7 +100,8 @@ double StrainOfFeatures(const std::string& rule) {
 }
 
 // The coarse level strains features, because it has too few vertices to bend only around them.
-// Their finer vertices undo some of that, the less the more they are held (docs/explanation/fit.md).
+// Their finer vertices undo some of that, the less the more they are held
+// (docs/explanation/fit.md).
 TEST(FeatureDistortion, TheMoreTheirOffsetsAreHeldTheMoreFeaturesAreStrained) {
   const double free = StrainOfFeatures("free"), weighted = StrainOfFeatures("weighted"),
                frozen = StrainOfFeatures("frozen"), restored = StrainOfFeatures("restore");

@@ -97,7 +97,8 @@ TEST(Identification, ALargerFaceIsAnotherFace) {
 TEST(Identification, SeenAgainAFaceIsCloserToItselfThanToAnother) {
   const KnownFace one = PersonOf(1), two = PersonOf(2);
   const ProbeFace again = SimulateRescan(one, 3, 0.5, 7);
-  const FaceDistance own = MeasureFaceDistance(again, one, {}), other = MeasureFaceDistance(again, two, {});
+  const FaceDistance own = MeasureFaceDistance(again, one, {}),
+                     other = MeasureFaceDistance(again, two, {});
   EXPECT_GT(own.surface_mm, 0.05);
   EXPECT_LT(own.surface_mm, other.surface_mm);
   EXPECT_LT(own.landmarks_mm, other.landmarks_mm);

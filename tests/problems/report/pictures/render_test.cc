@@ -9,11 +9,11 @@
 #include <stdexcept>
 
 #include "problems/report/pictures/lighting.h"
-#include "surfaces/mesh/mesh_primitives.h"
 #include "problems/report/pictures/pictures.h"
 #include "problems/report/pictures/raster.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
+#include "surfaces/mesh/mesh_primitives.h"
 #include "surfaces/mesh_files/srgb.h"
 #include "tests/testing/pixels.h"
 #include "tests/testing/shapes.h"

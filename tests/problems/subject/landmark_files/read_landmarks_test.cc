@@ -117,7 +117,8 @@ TEST_F(LandmarkReadingTest, ListsWhatAFileLoses) {
   EXPECT_THAT(LostContents(file, "a.csv"), IsEmpty());
   EXPECT_THAT(LostContents(file, "a.fcsv"),
               ElementsAre("normals, depths and certainties of 32 landmarks"));
-  EXPECT_THAT(LostContents(file, "a.pp"), ElementsAre(HasSubstr("normals"), "notes of 32 landmarks"));
+  EXPECT_THAT(LostContents(file, "a.pp"),
+              ElementsAre(HasSubstr("normals"), "notes of 32 landmarks"));
   file.absent.push_back({"g", "gone"});
   EXPECT_THAT(LostContents(file, "a.csv"), ElementsAre(HasSubstr("1 sites")));
   EXPECT_THAT(LostContents(file, "a.yaml"), IsEmpty());
