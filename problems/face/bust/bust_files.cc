@@ -13,6 +13,7 @@
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/mesh_files/glb.h"
+#include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance::problems {
 namespace {
@@ -55,7 +56,7 @@ std::array<std::uint8_t, 3> ToBytes(const Vec3& colour) {
 
 // The colour of faces whose material no library describes.
 std::array<double, 3> PlainColour(const ObjText& obj) {
-  return obj.colours.empty() ? kSkinColour : kWhite;
+  return obj.file.colours.empty() ? kSkinColour : kWhite;
 }
 
 std::string MaterialName(const std::string& material) {
@@ -75,7 +76,7 @@ void GiveLooks(const std::string& material, const ObjText& obj, Piece& piece) {
       piece.colours.clear();
     }
   }
-  if (obj.texture.empty()) {
+  if (obj.file.texture.empty()) {
     piece.uv.clear();
   }
 }
@@ -85,26 +86,24 @@ std::vector<Piece> TexturedPieces(const TriMesh& skin, const ObjText& obj) {
   const std::vector<Vec3> normals = VertexNormals(skin);
   std::map<std::string, Piece> pieces;
   std::map<std::string, std::map<std::pair<std::int32_t, std::int32_t>, std::int32_t>> numbers;
-  for (const ObjFace& face : obj.faces) {
+  for (const ObjPolygon& face : obj.file.polygons) {
     Piece& piece = pieces[face.material];
     auto& number = numbers[face.material];
     std::vector<std::int32_t> corners;
-    for (const ObjCorner& corner : face.corners) {
+    for (const ObjPolygonCorner& corner : face.corners) {
       const auto [it, is_new] = number.try_emplace({corner.point, corner.texture},
                                                    static_cast<std::int32_t>(piece.points.size()));
       if (is_new) {
         piece.points.push_back(skin.points[corner.point]);
         piece.normals.push_back(normals[corner.point]);
-        piece.uv.push_back(corner.texture < 0 ? Vec2(0, 0) : obj.texture[corner.texture]);
-        if (!obj.colours.empty()) {
-          piece.colours.push_back(ToBytes(obj.colours[corner.point]));
+        piece.uv.push_back(corner.texture < 0 ? Vec2(0, 0) : obj.file.texture[corner.texture]);
+        if (!obj.file.colours.empty()) {
+          piece.colours.push_back(ToBytes(obj.file.colours[corner.point]));
         }
       }
       corners.push_back(it->second);
     }
-    for (std::size_t k = 2; k < corners.size(); ++k) {
-      piece.triangles.push_back({corners[0], corners[k - 1], corners[k]});
-    }
+    AppendFan(corners, piece.triangles);
   }
   std::vector<Piece> result;
   for (auto& [name, piece] : pieces) {
@@ -202,7 +201,7 @@ void AppendMtl(const std::string& name, const std::array<double, 3>& colour, dou
 // Describes the materials of an OBJ without a library.
 void AppendPlainMtl(const ObjText& obj, std::string& mtl) {
   std::set<std::string> names;
-  for (const ObjFace& face : obj.faces) {
+  for (const ObjPolygon& face : obj.file.polygons) {
     names.insert(MaterialName(face.material));
   }
   for (const std::string& name : names) {
@@ -219,10 +218,8 @@ std::pair<std::string, std::string> ObjAndMtl(const Bust& bust, const BustModel&
     if (is_plain) {
       AppendPlainMtl(*model.obj, mtl);
     }
-    const bool starts_without = is_plain && model.obj->faces.front().material.empty();
-    obj = ObjWithPoints(
-        *model.obj, bust.skin.points,
-        {.library = "bust.mtl", .first_material = starts_without ? MaterialName("") : ""});
+    const bool starts_without = is_plain && model.obj->file.polygons.front().material.empty();
+    obj = ObjWithPoints(*model.obj, bust.skin.points, starts_without ? MaterialName("") : "");
   } else {
     obj = "# mm, LPS: +x subject left, +y posterior, +z up\nmtllib bust.mtl\n";
     AppendObj("skin", bust.skin, 0, obj);

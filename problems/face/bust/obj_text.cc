@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -22,23 +23,30 @@ namespace fs = std::filesystem;
 std::vector<std::string> Lines(const std::string& text) {
   std::vector<std::string> lines;
   std::istringstream in(text);
-  bool continues = false;
   for (std::string line; std::getline(in, line);) {
     if (!line.empty() && line.back() == '\r') {
       line.pop_back();
     }
-    const bool more = !line.empty() && line.back() == '\\';
-    if (more) {
-      line.back() = ' ';
-    }
-    if (continues) {
-      lines.back() += line;
-    } else {
-      lines.push_back(line);
-    }
-    continues = more;
+    lines.push_back(std::move(line));
   }
   return lines;
+}
+
+// A line of a material library goes on after a backslash at its end.
+std::vector<std::string> JoinContinued(const std::vector<std::string>& lines) {
+  std::vector<std::string> joined;
+  bool continues = false;
+  for (const std::string& line : lines) {
+    if (!continues) {
+      joined.emplace_back();
+    }
+    joined.back() += line;
+    continues = line.ends_with('\\');
+    if (continues) {
+      joined.back().back() = ' ';
+    }
+  }
+  return joined;
 }
 
 std::vector<std::string> Words(const std::string& line) {
@@ -66,28 +74,6 @@ std::optional<double> FiniteNumber(const std::string& word) {
   const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
   const bool whole = error == std::errc() && end == word.data() + word.size();
   return whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
-}
-
-double ReadNumber(const std::string& word, const std::string& name, std::size_t line) {
-  const std::optional<double> value = FiniteNumber(word);
-  if (!value) {
-    throw InputError(
-        fmt::format("{}: line {}: '{}' is not a number", name, line, word.substr(0, 40)));
-  }
-  return *value;
-}
-
-// `v x y z r g b`, with or without a weight before the colour.
-std::optional<Vec3> ReadColour(const std::vector<std::string>& words) {
-  if (words.size() < 7) {
-    return std::nullopt;
-  }
-  Vec3 colour;
-  for (int c = 0; c < 3; ++c) {
-    colour[c] = FiniteNumber(words[words.size() - 3 + c]).value_or(kNaN);
-  }
-  const bool within = (colour.array() >= 0).all() && (colour.array() <= 1).all();
-  return within ? std::optional(colour) : std::nullopt;
 }
 
 // The path of a file that another one names. It must lie below the folder of the other one, so that
@@ -150,93 +136,29 @@ std::string WithoutComment(const std::string& line) {
   return line.substr(0, line.find_last_not_of(" \t", end - 1) + 1);
 }
 
-class ObjReader {
+class LibraryReader {
  public:
-  explicit ObjReader(const fs::path& path) : path_(path), name_(path.string()) {
-    obj_.lines = Lines(ReadFileBytes(path));
-    std::string material;
-    for (std::size_t k = 0; k < obj_.lines.size(); ++k) {
-      const std::vector<std::string> words = Words(obj_.lines[k]);
-      if (words.empty()) {
-        continue;
-      }
-      if (words[0] == "v") {
-        Point(words);
-      } else if (words[0] == "vt") {
-        Texture(words, k + 1);
-      } else if (words[0] == "usemtl") {
-        material = Rest(obj_.lines[k]);
-      } else if (words[0] == "mtllib") {
-        Libraries(obj_.lines[k]);
-      } else if (words[0] == "f") {
-        Face(words, material, k + 1);
-      }
-    }
-    if (obj_.colours.size() != points_) {
-      obj_.colours.clear();
-    }
-  }
-  ObjText Take() { return std::move(obj_); }
+  LibraryReader(const fs::path& path, ObjText& obj)
+      : folder_(path.parent_path()), name_(path.string()), obj_(obj) {}
 
- private:
-  void Point(const std::vector<std::string>& words) {
-    ++points_;
-    if (const std::optional<Vec3> colour = ReadColour(words)) {
-      obj_.colours.push_back(*colour);
-    }
-  }
-
-  void Texture(const std::vector<std::string>& words, std::size_t line) {
-    const auto at = [&](std::size_t k) {
-      return k < words.size() ? ReadNumber(words[k], name_, line) : 0.0;
-    };
-    obj_.texture.emplace_back(at(1), at(2));
-  }
-
-  std::int32_t Index(const std::string& word, std::size_t count, std::size_t line) const {
-    const double given = ReadNumber(word, name_, line);
-    const double index = given < 0 ? static_cast<double>(count) + given : given - 1;
-    if (!(index >= 0 && index < static_cast<double>(count))) {
-      throw InputError(fmt::format("{}: line {}: index {} is not among the {} before it", name_,
-                                   line, word.substr(0, 40), count));
-    }
-    return static_cast<std::int32_t>(index);
-  }
-
-  void Face(const std::vector<std::string>& words, const std::string& material, std::size_t line) {
-    ObjFace face{{}, material};
-    for (std::size_t k = 1; k < words.size(); ++k) {
-      const std::size_t slash = words[k].find('/');
-      ObjCorner corner{Index(words[k].substr(0, slash), points_, line), -1};
-      if (slash != std::string::npos) {
-        const std::string texture =
-            words[k].substr(slash + 1, words[k].find('/', slash + 1) - slash - 1);
-        corner.texture = texture.empty() ? -1 : Index(texture, obj_.texture.size(), line);
-      }
-      face.corners.push_back(corner);
-    }
-    obj_.faces.push_back(std::move(face));
-  }
-
-  // The line has one name with spaces, or several names.
-  void Libraries(const std::string& line) {
-    const fs::path folder = path_.parent_path();
+  // given: the rest of a `mtllib` line, which is one name with spaces, or several names.
+  void Read(const std::string& given) {
     const auto is_there = [&](const std::string& name) {
-      return IsFile(PathBelow(folder, name, name_));
+      return IsFile(PathBelow(folder_, name, name_));
     };
-    const std::string rest = Rest(line);
-    std::vector<std::string> names = Words(rest);
-    if (is_there(rest) || std::ranges::none_of(names, is_there)) {
-      names = {rest};
+    std::vector<std::string> names = Words(given);
+    if (is_there(given) || std::ranges::none_of(names, is_there)) {
+      names = {given};
     }
     for (const std::string& name : names) {
-      Library(PathBelow(folder, name, name_));
+      Library(PathBelow(folder_, name, name_));
     }
   }
 
+ private:
   void Library(const fs::path& path) {
     std::string material;
-    for (const std::string& line : Lines(ReadFileBytes(path))) {
+    for (const std::string& line : JoinContinued(Lines(ReadFileBytes(path)))) {
       const std::vector<std::string> words = Words(line);
       if (words.size() >= 2 && IsMap(words[0])) {
         Map(line, path, material);
@@ -247,12 +169,22 @@ class ObjReader {
         material = Rest(line);
         obj_.materials[material] = {};
       } else if (words.size() >= 4 && words[0] == "Kd") {
-        for (int c = 0; c < 3; ++c) {
-          obj_.materials[material].colour[c] =
-              std::clamp(ReadNumber(words[c + 1], path.string(), 0), 0.0, 1.0);
-        }
+        obj_.materials[material].colour = ReadColour(words, path);
       }
     }
+  }
+
+  static Vec3 ReadColour(const std::vector<std::string>& words, const fs::path& library) {
+    Vec3 colour;
+    for (int c = 0; c < 3; ++c) {
+      const std::optional<double> value = FiniteNumber(words[c + 1]);
+      if (!value) {
+        throw InputError(fmt::format("{}: '{}' is not a number; a colour is like Kd 0.8 0.6 0.5",
+                                     library.string(), words[c + 1].substr(0, 40)));
+      }
+      colour[c] = std::clamp(*value, 0.0, 1.0);
+    }
+    return colour;
   }
 
   // The name follows the options. If there is no such file, the last word is taken, because the
@@ -317,10 +249,9 @@ class ObjReader {
     return name;
   }
 
-  const fs::path path_;
-  const std::string name_;
-  ObjText obj_;
-  std::size_t points_ = 0;
+  const fs::path folder_;
+  const std::string name_;  // of the OBJ, for messages
+  ObjText& obj_;
 };
 
 std::string FaceWithoutNormals(const std::vector<std::string>& words) {
@@ -337,21 +268,22 @@ std::string FaceWithoutNormals(const std::vector<std::string>& words) {
   return line;
 }
 
-bool NamesLibrary(const std::string& line) {
-  constexpr std::string_view kKey = "mtllib";
-  return line.find(kKey) != std::string::npos && line.find_first_not_of(" \t") == line.find(kKey) &&
-         Words(line)[0] == kKey;
-}
-
 }  // namespace
 
-ObjText ReadObjText(const fs::path& path) { return ObjReader(path).Take(); }
+ObjText ReadObjText(const fs::path& path) {
+  const std::string bytes = ReadFileBytes(path);
+  ObjText obj{ReadObjFile(bytes, path.string()), Lines(bytes), {}, {}, {}};
+  LibraryReader reader(path, obj);
+  for (const std::string& library : obj.file.libraries) {
+    reader.Read(library);
+  }
+  return obj;
+}
 
 std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
-                          const ObjLooks& looks) {
-  bool named = std::ranges::none_of(obj.lines, NamesLibrary);
-  std::string text = named ? fmt::format("mtllib {}\n", looks.library) : "";
-  std::string first_material = looks.first_material;
+                          std::string first_material) {
+  bool named = obj.file.libraries.empty();
+  std::string text = named ? "mtllib bust.mtl\n" : "";
   std::size_t next = 0;
   for (const std::string& line : obj.lines) {
     const std::vector<std::string> words = Words(line);
@@ -365,7 +297,7 @@ std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
     } else if (key == "vn" || (key == "mtllib" && named)) {
       continue;
     } else if (key == "mtllib") {
-      text += "mtllib " + looks.library;
+      text += "mtllib bust.mtl";
       named = true;
     } else if (key == "f") {
       if (!first_material.empty()) {

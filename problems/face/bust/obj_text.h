@@ -2,31 +2,20 @@
 // An OBJ file with its materials and textures, so that it can be written again with other points.
 #pragma once
 
-#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "surfaces/base/geometry.h"
+#include "surfaces/mesh_files/read_obj.h"
 
 namespace semblance::problems {
 
 struct ObjMaterial {
   Vec3 colour = Vec3::Constant(0.8);  // Kd, 0..1
   std::filesystem::path texture;      // map_Kd; empty: none
-};
-
-struct ObjCorner {
-  std::int32_t point = -1;
-  std::int32_t texture = -1;  // -1: none
-};
-
-struct ObjFace {
-  std::vector<ObjCorner> corners;
-  std::string material;  // empty before the first `usemtl`
 };
 
 // A picture that a material names.
@@ -41,10 +30,8 @@ struct MtlLine {
 };
 
 struct ObjText {
-  std::vector<std::string> lines;  // continued lines are joined
-  std::vector<Vec2> texture;       // as written: v upwards
-  std::vector<Vec3> colours;       // sRGB, 0..1, one per point; empty unless all points have one
-  std::vector<ObjFace> faces;
+  ObjFile file;
+  std::vector<std::string> lines;  // of the file
   std::map<std::string, ObjMaterial> materials;
   std::vector<MtlLine> mtl;          // the lines of the material libraries
   std::vector<ObjTexture> textures;  // each file once
@@ -52,18 +39,15 @@ struct ObjText {
 
 // Reads a file that ReadMesh has accepted. Names after `mtllib` or `map_` may contain spaces.
 // Throws IoError for a material library or texture that cannot be read. Throws InputError for one
-// outside the folder of the OBJ, for a `map_Kd` that is neither PNG nor JPEG, and for a missing
-// texture coordinate.
+// outside the folder of the OBJ, for a `map_Kd` that is neither PNG nor JPEG, and as ReadObjFile
+// does.
 ObjText ReadObjText(const std::filesystem::path& path);
 
-struct ObjLooks {
-  std::string library;         // the name after `mtllib`
-  std::string first_material;  // of faces before the first `usemtl`; empty: none
-};
-
-// The same lines with these points, without normals. points: as many as the file has.
+// The same lines with these points, without normals, and with `bust.mtl` as the only material
+// library. points: as many as the file has. first_material: of faces before the first `usemtl`;
+// empty: none.
 std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,
-                          const ObjLooks& looks);
+                          std::string first_material);
 
 // The material libraries joined into one, with the textures' names in the folder of a run.
 std::string JoinMtl(const ObjText& obj);

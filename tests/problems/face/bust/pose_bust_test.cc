@@ -349,7 +349,7 @@ TEST_F(ObjBust, ATextureMayHaveSpacesAndOptions) {
 
 TEST_F(ObjBust, MayNameSeveralLibrariesOnALine) {
   Write("one.mtl", "newmtl face\nKd 1 0 0");
-  Write("two.mtl", "newmtl hair\nKd 0 1 0\n");
+  Write("two.mtl", "newmtl hair\nKd 0 1\\\n0\n");  // a line that continues
   WriteObj("mtllib one.mtl two.mtl # both\n");
   EXPECT_EQ(Files().at("bust.mtl"), "newmtl face\nKd 1 0 0\nnewmtl hair\nKd 0 1 0\n");
   Write("one.mtl two.mtl", "newmtl face\nKd 0 0 1\n");
@@ -404,10 +404,10 @@ TEST_F(ObjBust, HasTheColoursOfItsPointsButWhereThereIsAPicture) {
 }
 
 TEST_F(ObjBust, WithoutMaterialsHasASkin) {
-  WriteObj("# mine\n", "f 1 2 3 4\n", " 1 0.5 0");
+  WriteObj("# mine\\\n", "f 1 2 3 4\n", " 1 0.5 0");  // no line of an OBJ continues
   const auto files = Files();
   EXPECT_THAT(files.at("bust.obj"),
-              ::testing::StartsWith("mtllib bust.mtl\n# mine\nv 0 0 0 1 0.5"));
+              ::testing::StartsWith("mtllib bust.mtl\n# mine\\\nv 0 0 0 1 0.5"));
   EXPECT_THAT(files.at("bust.obj"), ::testing::EndsWith("usemtl skin\nf 1 2 3 4\n"));
   EXPECT_THAT(files.at("bust.mtl"), ::testing::StartsWith("newmtl skin\nKd 1 1 1\n"));
   const auto json = JsonOf(files.at("bust.glb"));
@@ -482,7 +482,7 @@ TEST_F(BadBust, AnEndingInCapitalsMakesNone) {
   bust.landmarks = folder_ / "SITES.CSV";
   const auto model = LoadBust(bust, IctTemplate{}, {});
   ASSERT_TRUE(model && model->obj);
-  EXPECT_EQ(model->obj->faces.size(), model->mesh.triangles.size());
+  EXPECT_EQ(model->obj->file.polygons.size(), model->mesh.triangles.size());
 }
 
 // ------------------------------------------------------------------------------------------------
