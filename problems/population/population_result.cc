@@ -149,9 +149,7 @@ std::string ScoreLine(const PredictedSites& way) {
                                   : fmt::format("no sd stated, {} depths", s.points));
 }
 
-using Json = nlohmann::ordered_json;
-
-Json ScoreOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+using Json = nlohmann::ordered_json;  // writes NaN as null
 
 const std::string& SubjectName(const PopulationResult& result, int row) {
   return result.subjects[result.counted[row]].person.name;
@@ -233,21 +231,21 @@ std::string DenseCsv(const DepthModes& dense) {
 Json ScoresJson(const PredictedSites& way) {
   const DepthScores& s = way.scores;
   return {{"points", s.points},
-          {"mae_mm", ScoreOrNull(s.mae_mm)},
-          {"rmse_mm", ScoreOrNull(s.rmse_mm)},
-          {"bias_mm", ScoreOrNull(s.bias_mm)},
-          {"crps_mm", ScoreOrNull(s.crps_mm)},
-          {"log_score", ScoreOrNull(s.log_score)},
-          {"interval_score_90_mm", ScoreOrNull(s.interval_score_90_mm)},
-          {"coverage_50", ScoreOrNull(s.coverage_50)},
-          {"coverage_90", ScoreOrNull(s.coverage_90)},
-          {"coverage_95", ScoreOrNull(s.coverage_95)},
-          {"mean_sd_mm", ScoreOrNull(s.mean_sd_mm)},
+          {"mae_mm", s.mae_mm},
+          {"rmse_mm", s.rmse_mm},
+          {"bias_mm", s.bias_mm},
+          {"crps_mm", s.crps_mm},
+          {"log_score", s.log_score},
+          {"interval_score_90_mm", s.interval_score_90_mm},
+          {"coverage_50", s.coverage_50},
+          {"coverage_90", s.coverage_90},
+          {"coverage_95", s.coverage_95},
+          {"mean_sd_mm", s.mean_sd_mm},
           {"mae_less_mean_mm",
            {{"subjects", way.against_mean_mm.n},
-            {"mean", ScoreOrNull(way.against_mean_mm.mean)},
-            {"low_95", ScoreOrNull(way.against_mean_mm.mean_95.low)},
-            {"high_95", ScoreOrNull(way.against_mean_mm.mean_95.high)}}}};
+            {"mean", way.against_mean_mm.mean},
+            {"low_95", way.against_mean_mm.mean_95.low},
+            {"high_95", way.against_mean_mm.mean_95.high}}}};
 }
 
 Json SummaryJson(const PopulationResult& result) {
@@ -260,7 +258,7 @@ Json SummaryJson(const PopulationResult& result) {
                  {"failed", result.Count("failed")},
                  {"missing", result.Count("missing")},
                  {"counted", result.counted.size()}}},
-               {"shrinkage", ScoreOrNull(result.joint.shrinkage)},
+               {"shrinkage", result.joint.shrinkage},
                {"outliers", result.outliers.size()},
                {"leave_one_out", Json::object()},
                {"modes", Json::array()},
@@ -269,7 +267,7 @@ Json SummaryJson(const PopulationResult& result) {
     json["leave_one_out"][way.name] = ScoresJson(way);
   }
   for (const double share : result.dense.share) {
-    json["modes"].push_back({{"share", ScoreOrNull(share)}});
+    json["modes"].push_back({{"share", share}});
   }
   json["libraries"] = Json::object();
   for (const auto& [name, version] : LibraryVersions()) {

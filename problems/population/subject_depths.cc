@@ -25,7 +25,7 @@
 namespace semblance::problems {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using Json = nlohmann::ordered_json;  // writes NaN as null
 
 constexpr int kFormulaLevels = 3;  // levels of the generic head; 3 has all its detail
 
@@ -269,14 +269,6 @@ DenseDepths DepthsOverSkull(const LandmarkFile& landmarks, const TriMesh& skull,
           .depth_mm = truth.depth_mm};
 }
 
-Json Numbers(const std::vector<double>& values) {
-  Json list = Json::array();
-  for (const double value : values) {
-    list.push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
-  }
-  return list;
-}
-
 // Reads a number; null is NaN.
 double ReadNumber(const Json& json) {
   constexpr double kLargest = 1e5;  // mm; the limit of coordinates of a mesh (mesh_check.h)
@@ -352,15 +344,14 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
 Json ToJson(const SubjectDepths& depths) {
   Json json = {{"name", depths.name},
                {"proposed", depths.proposed},
-               {"thickness", std::isfinite(depths.thickness) ? Json(depths.thickness) : Json()},
+               {"thickness", depths.thickness},
                {"notes", depths.notes},
                {"sites", Json::array()}};
   for (const SiteDepth& site : depths.sites) {
-    json["sites"].push_back(
-        {{"site", site.site},
-         {"depth_mm", std::isfinite(site.depth_mm) ? Json(site.depth_mm) : Json()},
-         {"confidence", site.confidence},
-         {"why_not", site.why_not}});
+    json["sites"].push_back({{"site", site.site},
+                             {"depth_mm", site.depth_mm},
+                             {"confidence", site.confidence},
+                             {"why_not", site.why_not}});
   }
   std::vector<double> bone;
   for (const Vec3& p : depths.dense.bone) {
@@ -368,8 +359,8 @@ Json ToJson(const SubjectDepths& depths) {
   }
   json["dense"] = {{"columns", depths.dense.columns},
                    {"rows", depths.dense.rows},
-                   {"bone", Numbers(bone)},
-                   {"depth_mm", Numbers(depths.dense.depth_mm)}};
+                   {"bone", bone},
+                   {"depth_mm", depths.dense.depth_mm}};
   return json;
 }
 

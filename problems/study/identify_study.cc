@@ -118,10 +118,7 @@ std::string TemplateText(const Experiment& experiment) {
 }
 
 Json MatchJson(const Match& match) {
-  const auto number = [](double x) { return std::isfinite(x) ? Json(x) : Json(nullptr); };
-  return {{"rank", number(match.rank)},
-          {"own_mm", number(match.own_mm)},
-          {"best_other_mm", number(match.best_other_mm)}};
+  return {{"rank", match.rank}, {"own_mm", match.own_mm}, {"best_other_mm", match.best_other_mm}};
 }
 
 Json ProbeJson(const ProbeMatch& probe) {

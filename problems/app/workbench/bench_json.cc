@@ -2,7 +2,6 @@
 #include "problems/app/workbench/bench_json.h"
 
 #include <algorithm>
-#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "problems/app/workbench/bench_config.h"
@@ -15,11 +14,7 @@
 namespace semblance::problems {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json FiniteOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
-
-Json PointJson(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+using Json = nlohmann::ordered_json;  // writes NaN as null
 
 Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
   Json json = {{"site", l.site},
@@ -29,9 +24,9 @@ Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
                {"proposed", l.proposed}};
   json["depth_along_normal_mm"] = l.depth_along_normal_mm ? Json(*l.depth_along_normal_mm) : Json();
   if (const auto at = checks.sites.find(l.site); at != checks.sites.end()) {
-    json["from_bone_mm"] = FiniteOrNull(at->second.from_bone_mm);
-    json["from_predicted_mm"] = FiniteOrNull(at->second.from_predicted_mm);
-    json["from_mirror_mm"] = FiniteOrNull(at->second.from_mirror_mm);
+    json["from_bone_mm"] = at->second.from_bone_mm;
+    json["from_predicted_mm"] = at->second.from_predicted_mm;
+    json["from_mirror_mm"] = at->second.from_mirror_mm;
   }
   return json;
 }
@@ -48,7 +43,7 @@ Json SubjectJson(const Bench::Snapshot& shot) {
                {"notes", subject.notes}};
   if (!subject.skull.mesh.points.empty()) {
     const Box3 box = Bounds(subject.skull.mesh);
-    json["size_mm"] = PointJson(box.sizes());
+    json["size_mm"] = Vec3(box.sizes());
   }
   return json;
 }
@@ -69,18 +64,14 @@ const char* JobWord(JobState state) {
 }
 
 Json JobJson(const JobStatus& job) {
-  return {{"name", job.name},
-          {"state", JobWord(job.state)},
-          {"step", job.step},
-          {"fraction", FiniteOrNull(job.fraction)},
-          {"seconds", FiniteOrNull(job.seconds)},
-          {"words", job.words}};
+  return {{"name", job.name},         {"state", JobWord(job.state)}, {"step", job.step},
+          {"fraction", job.fraction}, {"seconds", job.seconds},      {"words", job.words}};
 }
 
 Json PredictedJson(const LandmarkChecks& checks) {
   Json json = Json::array();
   for (const auto& [site, point] : checks.predicted) {
-    json.push_back({{"site", site}, {"point", PointJson(point)}});
+    json.push_back({{"site", site}, {"point", point}});
   }
   return json;
 }
@@ -96,10 +87,10 @@ Json DowelsJson(const std::vector<Dowel>& dowels) {
   for (const Dowel& dowel : dowels) {
     if (dowel.Tip().allFinite()) {
       json.push_back({{"site", dowel.site},
-                      {"base", PointJson(dowel.base)},
-                      {"tip", PointJson(dowel.Tip())},
+                      {"base", dowel.base},
+                      {"tip", dowel.Tip()},
                       {"depth_mm", dowel.depth_mm},
-                      {"sd_mm", FiniteOrNull(dowel.sd_mm)}});
+                      {"sd_mm", dowel.sd_mm}});
     }
   }
   return json;
@@ -113,7 +104,7 @@ Json SiteJson(const Site& site) {
                {"definition", SiteDefinition(site.landmark)},
                {"standard", IsStandardSite(site.code)}};
   if (IsStandardSite(site.code)) {
-    json["average"] = PointJson(AverageSite(site.code));
+    json["average"] = AverageSite(site.code);
   }
   return json;
 }
@@ -161,7 +152,7 @@ std::string FaceJson(const BenchFace& face) {
               {"dowels", DowelsJson(face.dowels)},
               {"notes", face.notes},
               {"finest_level", face.surface.shape().max_level},
-              {"seconds", FiniteOrNull(face.seconds)}}
+              {"seconds", face.seconds}}
       .dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

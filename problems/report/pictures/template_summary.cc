@@ -16,22 +16,20 @@
 namespace semblance::problems {
 namespace {
 
-using Json = nlohmann::ordered_json;
-
-Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+using Json = nlohmann::ordered_json;  // writes NaN as null
 
 Json ToJson(const SkinDistance& d) {
-  return {{"rms_mm", NumberOrNull(d.rms_mm)},
-          {"p95_mm", NumberOrNull(d.p95_mm)},
-          {"max_mm", NumberOrNull(d.max_mm)},
-          {"covered", NumberOrNull(d.covered)},
-          {"area_mm2", NumberOrNull(d.area_mm2)}};
+  return {{"rms_mm", d.rms_mm},
+          {"p95_mm", d.p95_mm},
+          {"max_mm", d.max_mm},
+          {"covered", d.covered},
+          {"area_mm2", d.area_mm2}};
 }
 
 Json ToJson(const TemplateLevel& level) {
   return {{"level", level.level},
           {"rounds", level.rounds},
-          {"matched", NumberOrNull(level.matched)},
+          {"matched", level.matched},
           {"vertices", level.vertices},
           {"face_to_skin", ToJson(level.face_to_skin)}};
 }
@@ -40,8 +38,8 @@ Json ToJson(const TemplateSite& site) {
   return {{"u", site.uv.x()},
           {"v", site.uv.y()},
           {"from_landmark", site.from_landmark},
-          {"drift_mm", NumberOrNull(site.drift_mm)},
-          {"error_mm", NumberOrNull(site.error_mm)}};
+          {"drift_mm", site.drift_mm},
+          {"error_mm", site.error_mm}};
 }
 
 std::string DescribeDistance(const SkinDistance& d) {
