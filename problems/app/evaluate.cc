@@ -58,12 +58,10 @@ Truth ReadTruthOfExperiment(const EvaluateOptions& options, const RunContext& co
 std::vector<Dowel> MakeDowels(const LandmarkFile& file) {
   std::vector<Dowel> dowels;
   for (const Landmark& landmark : file.landmarks) {
-    const auto& p = landmark.point;
     const auto& n = landmark.normal;
     dowels.push_back({.site = landmark.site,
-                      .base = {p[0], p[1], p[2]},
-                      .direction = n ? Vec3(Vec3((*n)[0], (*n)[1], (*n)[2]).normalized())
-                                     : Vec3::Constant(kNaN)});
+                      .base = landmark.Position(),
+                      .direction = n ? Vec3(Vec3(n->data()).normalized()) : Vec3::Constant(kNaN)});
   }
   return dowels;
 }

@@ -75,9 +75,7 @@ int WritePhantom(const PhantomArguments& a) {
   const CtVolume volume = VoxelisePhantom(phantom, a.ct);
   WriteSlices(volume, a.phantom.random_seed, folder);
   LandmarkFile landmarks = PhantomLandmarks(phantom, a.phantom.random_seed);
-  std::erase_if(landmarks.landmarks, [&](const Landmark& l) {
-    return lost.Holds({l.point[0], l.point[1], l.point[2]});
-  });
+  std::erase_if(landmarks.landmarks, [&](const Landmark& l) { return lost.Holds(l.Position()); });
   folder.Write("landmarks.yaml", EncodeLandmarks(landmarks, "landmarks.yaml"));
   folder.Write("true_skin.ply", EncodeMesh(phantom.face, ".ply"));
   fmt::print(

@@ -177,7 +177,7 @@ NetworkPlan PlanFor(const Experiment& experiment, const LandmarkFile& landmarks,
   std::vector<Vec3> at;
   for (const Landmark& landmark : landmarks.landmarks) {
     sites.push_back(landmark.site);
-    at.emplace_back(landmark.point[0], landmark.point[1], landmark.point[2]);
+    at.push_back(landmark.Position());
     points[landmark.site] = at.back();
   }
   const std::vector<bool> kept = KeptSites(experiment.landmarks.keep, sites, at);
@@ -212,7 +212,7 @@ Case StartCase(const SubjectData& data, const Experiment& experiment, const Mesh
   }
   subject.dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks);
   for (const Landmark& landmark : data.landmarks.landmarks) {
-    subject.points[landmark.site] = {landmark.point[0], landmark.point[1], landmark.point[2]};
+    subject.points[landmark.site] = landmark.Position();
   }
   return subject;
 }

@@ -150,7 +150,7 @@ double Plateau(double distance, double half_width) {
 }
 
 // 0 below `from`, 1 above `to`, C2.
-double SmoothStep(double x, double from, double to) {
+double SmootherStep(double x, double from, double to) {
   const double t = std::clamp((x - from) / (to - from), 0.0, 1.0);
   return t * t * t * (t * (6 * t - 15) + 10);
 }
@@ -241,7 +241,7 @@ Vec3 NoseOffset(double x, double z) {
   static const Curve forward = Column(kNose, &NoseSection::z, &NoseSection::forward);
   static const Curve down = Column(kNose, &NoseSection::z, &NoseSection::down);
   static const Curve width = Column(kNose, &NoseSection::z, &NoseSection::half_width);
-  const double window = SmoothStep(z, -70, -58) * SmoothStep(-z, -12, -2);
+  const double window = SmootherStep(z, -70, -58) * SmootherStep(-z, -12, -2);
   if (window == 0) {
     return Vec3::Zero();
   }

@@ -79,8 +79,6 @@ std::optional<double> SkinDepth(const Landmark& landmark) {
                                         : landmark.depth_closest_mm;
 }
 
-Vec3 ToVec3(const std::array<double, 3>& v) { return {v[0], v[1], v[2]}; }
-
 void ReadSkullLandmarks(const fs::path& file, SkinLandmarks& landmarks) {
   LandmarkReading reading = ReadLandmarks(file);
   std::ranges::move(reading.notes, std::back_inserter(landmarks.notes));
@@ -90,10 +88,10 @@ void ReadSkullLandmarks(const fs::path& file, SkinLandmarks& landmarks) {
   for (const Landmark& landmark : skull.landmarks) {
     const std::optional<double> depth_mm = SkinDepth(landmark);
     if (on_skin) {
-      landmarks.points.push_back({landmark.site, ToVec3(landmark.point)});
+      landmarks.points.push_back({landmark.site, landmark.Position()});
     } else if (depth_mm && landmark.normal) {
       landmarks.points.push_back(
-          {landmark.site, ToVec3(landmark.point) + *depth_mm * ToVec3(*landmark.normal)});
+          {landmark.site, landmark.Position() + *depth_mm * Vec3(landmark.normal->data())});
     } else {
       landmarks.notes.push_back(
           fmt::format("{}: site {} has no depth or no normal, so its skin point is not known; it "
@@ -118,7 +116,7 @@ void CheckOnce(const SkinLandmarks& landmarks) {
 SkinLandmarks ReadSkinLandmarks(std::span<const fs::path> files) {
   SkinLandmarks landmarks;
   for (const fs::path& file : files) {
-    if (LowerCase(file.extension().string()) == ".csv") {
+    if (LowerExtension(file) == ".csv") {
       ReadCsv(file, landmarks);
     } else {
       ReadSkullLandmarks(file, landmarks);

@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 
 #include "fitting/problem/seeding.h"
 #include "fitting/relaxation/dowel_mesh.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance::problems {
 namespace {
@@ -129,8 +129,7 @@ Json DepthToJson(const DepthField& depth, const Case& subject) {
   }
   if (!assigned.empty()) {
     json["min_mm"] = *std::min_element(assigned.begin(), assigned.end());
-    json["mean_mm"] = std::accumulate(assigned.begin(), assigned.end(), 0.0) /
-                      static_cast<double>(assigned.size());
+    json["mean_mm"] = ArithmeticMean(assigned);
     json["max_mm"] = *std::max_element(assigned.begin(), assigned.end());
   }
   return json;

@@ -354,12 +354,6 @@ void CollapseDistance::AssignSamples(CollapseError& error) const {
   }
 }
 
-double DistanceToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const double length2 = (b - a).squaredNorm();
-  const double t = length2 > 0 ? std::clamp((p - a).dot(b - a) / length2, 0.0, 1.0) : 0;
-  return (p - a - t * (b - a)).norm();
-}
-
 // The distance by which the border itself moves. Before the collapse it runs from the ring's end
 // over keep and gone to the ring's start; afterwards it runs over the target.
 double BorderDistance(const CollapseGeometry& collapse) {

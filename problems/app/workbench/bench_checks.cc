@@ -17,13 +17,11 @@
 namespace semblance::problems {
 namespace {
 
-Vec3 ToVec3(const Landmark& l) { return {l.point[0], l.point[1], l.point[2]}; }
-
 std::vector<SitePoint> StandardSites(const LandmarkFile& file) {
   std::vector<SitePoint> sites;
   for (const Landmark& l : file.landmarks) {
     if (IsStandardSite(l.site)) {
-      sites.push_back({l.site, ToVec3(l)});
+      sites.push_back({l.site, l.Position()});
     }
   }
   return sites;
@@ -82,7 +80,7 @@ LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, co
                               const PlaceOptions& options) {
   LandmarkChecks checks;
   for (const Landmark& l : file.landmarks) {
-    checks.sites[l.site].from_bone_mm = bone.Closest(ToVec3(l)).distance_mm;
+    checks.sites[l.site].from_bone_mm = bone.Closest(l.Position()).distance_mm;
   }
   const std::vector<SitePoint> sites = StandardSites(file);
   if (const auto fit = TryFitAverageSkull(sites)) {

@@ -25,12 +25,6 @@ TriMesh NetworkMesh(std::span<const Dowel> dowels, const DowelNetwork& network) 
   return mesh;
 }
 
-double DistanceToSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
-  const Vec3 ab = b - a;
-  const double s = std::clamp((p - a).dot(ab) / ab.squaredNorm(), 0.0, 1.0);
-  return (p - (a + s * ab)).norm();
-}
-
 // Measures how far a point lies outside, across a border edge of the nearest triangle: the distance
 // from its nearest point in that triangle's plane. 0 if the nearest point is not on the border.
 class BorderRule {

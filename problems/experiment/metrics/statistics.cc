@@ -8,7 +8,6 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
-#include <numeric>
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
@@ -18,10 +17,6 @@ namespace semblance::problems {
 namespace {
 
 double Rounded(double x) { return std::round(x * 1e9) / 1e9; }
-
-double Mean(std::span<const double> values) {
-  return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
-}
 
 Interval BootstrapMean(std::span<const double> values, std::uint64_t random_seed) {
   constexpr int kResamples = 4000;
@@ -118,7 +113,7 @@ SampleSummary Summarize(std::span<const double> values, std::uint64_t random_see
   }
   std::vector<double> sorted(values.begin(), values.end());
   std::sort(sorted.begin(), sorted.end());
-  s.mean = Mean(sorted);
+  s.mean = ArithmeticMean(sorted);
   const std::vector<WeightedValue> alike = SortedValues(sorted);
   s.median = Quantile(alike, 0.5);
   s.quartile_1 = Quantile(alike, 0.25);

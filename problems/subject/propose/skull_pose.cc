@@ -8,11 +8,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <numeric>
 
 #include "problems/face/shape_model/shape_model.h"
 #include "problems/subject/propose/skull_pose.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance::problems {
@@ -86,9 +86,7 @@ double Misfit_mm(const std::vector<ShellMatch>& matches) {
   }
   std::ranges::sort(distances_mm);
   distances_mm.resize(static_cast<std::size_t>(kKept * static_cast<double>(matches.size())));
-  return distances_mm.empty() ? kNaN
-                              : std::accumulate(distances_mm.begin(), distances_mm.end(), 0.0) /
-                                    static_cast<double>(distances_mm.size());
+  return ArithmeticMean(distances_mm);
 }
 
 struct Candidate {
