@@ -6,7 +6,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cstring>
 #include <map>
 
 #include "fitting/plan/fit_driver.h"
@@ -20,7 +19,10 @@ namespace semblance::fitting {
 namespace {
 
 using ::testing::HasSubstr;
+using testing::LargestDistance;
+using testing::LargestMove;
 using testing::RandomSurface;
+using testing::SameBytes;
 using testing::SmoothSurface;
 
 const std::vector<Term> kPointsOnly = {PointTerm{}};
@@ -45,19 +47,6 @@ FitTarget TargetOn(const HSplineSurface& surface, int count, const Vec3& shift =
   return target;
 }
 
-double NetDistance(const ControlNet& a, const ControlNet& b) {
-  double largest = 0;
-  for (std::size_t k = 0; k < a.vertices.size(); ++k) {
-    largest = std::max(largest, (a.vertices[k] - b.vertices[k]).norm());
-  }
-  return largest;
-}
-
-bool SameBytes(const ControlNet& a, const ControlNet& b) {
-  return a.vertices.size() == b.vertices.size() &&
-         std::memcmp(a.vertices.data(), b.vertices.data(), a.vertices.size() * sizeof(Vec3)) == 0;
-}
-
 std::map<VertexId, Vec3> OffsetsOf(const HSplineSurface& surface, int level) {
   std::map<VertexId, Vec3> offsets;
   for (const auto& [vertex, offset] : surface.Offsets()) {
@@ -68,16 +57,6 @@ std::map<VertexId, Vec3> OffsetsOf(const HSplineSurface& surface, int level) {
   return offsets;
 }
 
-double LargestDistance(const HSplineSurface& a, const HSplineSurface& b,
-                       const Similarity& a_from_b) {
-  double largest = 0;
-  for (int k = 0; k <= 40 * 40; ++k) {
-    const Vec2 uv(k % 41 / 40.0, k / 41 / 40.0);
-    largest = std::max(largest, (a.Point(uv) - a_from_b * b.Point(uv)).norm());
-  }
-  return largest;
-}
-
 TEST(Fit, ReproducesASurfaceOfTheSpace) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
     HSplineShape shape = Shape(closure);
@@ -86,7 +65,7 @@ TEST(Fit, ReproducesASurfaceOfTheSpace) {
     const FitResult result =
         Fit(start, TargetOn(truth, 3000), {},
             {.plan = ListedPlan{.schedule = {{1, 1}}}, .terms = kPointsOnly}, {});
-    EXPECT_LT(NetDistance(result.surface.Net(1), truth.Net(1)), 1e-8);
+    EXPECT_LT(LargestMove(result.surface.Net(1), truth.Net(1)), 1e-8);
     EXPECT_LT(LargestDistance(result.surface, truth, {}), 1e-9);
     EXPECT_LT(result.point_rms_mm, 1e-9);
     EXPECT_TRUE(result.usable);

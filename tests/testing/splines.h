@@ -2,7 +2,9 @@
 // H-spline surfaces for law tests, most of them random.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 
 #include "surfaces/base/random.h"
@@ -46,6 +48,31 @@ inline HSplineSurface RandomSurface(const HSplineShape& shape, std::uint64_t ran
     surface.SetOffsets(offsets);
   }
   return surface;
+}
+
+// The largest distance between points of equal (u,v), over a grid.
+inline double LargestDistance(const HSplineSurface& a, const HSplineSurface& b,
+                              const Similarity& a_from_b = {}) {
+  double largest = 0;
+  for (int k = 0; k <= 40 * 40; ++k) {
+    const Vec2 uv(k % 41 / 40.0, k / 41 / 40.0);
+    largest = std::max(largest, (a.Point(uv) - a_from_b * b.Point(uv)).norm());
+  }
+  return largest;
+}
+
+// The largest distance between corresponding vertices of two nets of one size.
+inline double LargestMove(const ControlNet& a, const ControlNet& b) {
+  double largest = 0;
+  for (std::size_t k = 0; k < a.vertices.size(); ++k) {
+    largest = std::max(largest, (a.vertices[k] - b.vertices[k]).norm());
+  }
+  return largest;
+}
+
+inline bool SameBytes(const ControlNet& a, const ControlNet& b) {
+  return a.vertices.size() == b.vertices.size() &&
+         std::memcmp(a.vertices.data(), b.vertices.data(), a.vertices.size() * sizeof(Vec3)) == 0;
 }
 
 // The `order`-th derivative (0..3) at x of the cubic B-spline with knots 0, 1, 2, 3, 4, from

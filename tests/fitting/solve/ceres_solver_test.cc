@@ -2,8 +2,6 @@
 // The solvers of a level agree.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "fitting/solve/ceres_solver.h"
 #include "fitting/solve/space_solve.h"
 #include "fitting/terms/term_cost.h"
@@ -15,16 +13,9 @@ namespace semblance::fitting {
 namespace {
 
 using testing::AllTerms;
+using testing::LargestMove;
 using testing::NoisyView;
 using testing::SmoothSurface;
-
-double Distance(const ControlNet& a, const ControlNet& b) {
-  double largest = 0;
-  for (std::size_t k = 0; k < a.vertices.size(); ++k) {
-    largest = std::max(largest, (a.vertices[k] - b.vertices[k]).norm());
-  }
-  return largest;
-}
 
 double CostOf(const std::vector<Term>& terms, const LevelView& view, const ControlNet& net) {
   double cost = 0;
@@ -49,7 +40,7 @@ void ExpectAllAgree(const LevelView& view, const std::vector<Term>& terms, doubl
   EXPECT_TRUE(a.usable && b.usable && direct.summary.usable);
   EXPECT_EQ(a.free_vertices, b.free_vertices);
   EXPECT_EQ(a.termination, "convergence");
-  EXPECT_LT(Distance(tiles, vertices), tolerance_mm);
+  EXPECT_LT(LargestMove(tiles, vertices), tolerance_mm);
   const double cost = CostOf(terms, view, direct.net);  // depends little on weakly held vertices
   EXPECT_NEAR(CostOf(terms, view, tiles), cost, 1e-9 * cost + 1e-15);
 }
@@ -114,9 +105,9 @@ TEST(CoupledSolver, FindsWhatCeresFinds) {
     const SolverOutcome ceres = SolveByCeres(view, terms, by_steps);
     EXPECT_EQ(outcome.termination, "convergence") << TermName(term);
     EXPECT_EQ(outcome.free_vertices, ceres.free_vertices);
-    EXPECT_LT(Distance(at_once, by_steps), 1e-5) << TermName(term);
+    EXPECT_LT(LargestMove(at_once, by_steps), 1e-5) << TermName(term);
     EXPECT_LE(CostOf(terms, view, at_once), CostOf(terms, view, by_steps) * (1 + 1e-12));
-    EXPECT_GT(Distance(at_once, view.start), 1e-3);
+    EXPECT_GT(LargestMove(at_once, view.start), 1e-3);
     EXPECT_EQ(FitLevel(view, terms, Solver::kFastest).summary.solver, "direct");
     EXPECT_EQ(FitLevel(view, terms, Solver::kCeres).summary.solver, "ceres");
   }

@@ -5,7 +5,6 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
 #include "fitting/least_squares/qr_compression.h"
@@ -20,24 +19,13 @@ namespace {
 
 using testing::AllTerms;
 using ::testing::HasSubstr;
+using testing::LargestMove;
 using testing::NoisyView;
 using testing::Observe;
 using testing::PlainStencil;
+using testing::SameBytes;
 using testing::Sheet;
 using testing::View;
-
-double Distance(const ControlNet& a, const ControlNet& b) {
-  double largest = 0;
-  for (std::size_t k = 0; k < a.vertices.size(); ++k) {
-    largest = std::max(largest, (a.vertices[k] - b.vertices[k]).norm());
-  }
-  return largest;
-}
-
-bool SameBytes(const ControlNet& a, const ControlNet& b) {
-  return a.vertices.size() == b.vertices.size() &&
-         std::memcmp(a.vertices.data(), b.vertices.data(), a.vertices.size() * sizeof(Vec3)) == 0;
-}
 
 TEST(ScheduleStep, ReproducesASurfaceOfTheSpace) {
   const ControlNet truth = Sheet(6, 5, 3, 4);
@@ -48,7 +36,7 @@ TEST(ScheduleStep, ReproducesASurfaceOfTheSpace) {
   }
   const LevelView view = View(Sheet(6, 5, 0, 0), lattice);
   const LevelSolution solution = FitLevel(view, std::vector<Term>{PointTerm{}});
-  EXPECT_LT(Distance(solution.net, truth), 1e-9);
+  EXPECT_LT(LargestMove(solution.net, truth), 1e-9);
   EXPECT_LT(solution.summary.rms_after_mm, 1e-10);
   EXPECT_TRUE(solution.summary.usable) << solution.summary.termination;
   EXPECT_EQ(solution.summary.uncovered_vertices, 0);
@@ -269,7 +257,8 @@ TEST(ScheduleStep, ReducedPointsAndTheDirectPathKeepTheMinimiser) {
     EXPECT_LT(ObservationDistance(view, direct.net, reference), 1e-9);
     EXPECT_LT(ObservationDistance(view, ceres.net, reference), 1e-7);
     EXPECT_EQ(direct.summary.free_vertices, ceres.summary.free_vertices);
-    EXPECT_LT(Distance(FitLevel(view, held, Solver::kFastest).net, FitLevel(view, held).net), 1e-8);
+    EXPECT_LT(LargestMove(FitLevel(view, held, Solver::kFastest).net, FitLevel(view, held).net),
+              1e-8);
   }
 }
 
@@ -339,7 +328,7 @@ TEST(ScheduleStep, RobustLossesResistOutliers) {
   }
   const LevelView view = View(Sheet(4, 3, 0, 0), observations);
   const auto error = [&](RobustLoss loss) {
-    return Distance(
+    return LargestMove(
         FitLevel(view, std::vector<Term>{PointTerm{.loss = loss, .loss_width_mm = 0.5}}).net,
         truth);
   };
@@ -350,7 +339,7 @@ TEST(ScheduleStep, RobustLossesResistOutliers) {
   LevelView near = view;
   near.start = FitLevel(view, std::vector<Term>{PointTerm{.loss = RobustLoss::kHuber}}).net;
   const PointTerm tukey{.loss = RobustLoss::kTukey, .loss_width_mm = 10};
-  EXPECT_LT(Distance(FitLevel(near, std::vector<Term>{tukey}).net, truth), 1e-3 * plain);
+  EXPECT_LT(LargestMove(FitLevel(near, std::vector<Term>{tukey}).net, truth), 1e-3 * plain);
 }
 
 TEST(ScheduleStep, NothingToSolveLeavesTheNet) {

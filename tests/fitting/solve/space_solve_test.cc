@@ -26,6 +26,8 @@ using testing::ErrorAgainst;
 using testing::FrankePoint;
 using ::testing::HasSubstr;
 using testing::HeadPoint;
+using testing::LargestDistance;
+using testing::LargestMove;
 using testing::PlainStart;
 using testing::RandomSurface;
 using testing::Scattered;
@@ -49,16 +51,6 @@ int VerticesOf(const HSplineSurface& surface) {
 
 HSplineShape HeadShape(int finest = 4) {
   return {.patches_u = 8, .patches_v = 8, .max_level = finest, .closure = Closure::kPeriodicU};
-}
-
-double LargestDistance(const HSplineSurface& a, const HSplineSurface& b,
-                       const Similarity& a_from_b = {}) {
-  double largest = 0;
-  for (int k = 0; k <= 40 * 40; ++k) {
-    const Vec2 uv(k % 41 / 40.0, k / 41 / 40.0);
-    largest = std::max(largest, (a.Point(uv) - a_from_b * b.Point(uv)).norm());
-  }
-  return largest;
 }
 
 FitTarget PointsOf(const HSplineSurface& surface, int count) {
@@ -481,14 +473,6 @@ double CostOf(const LevelView& view, const std::vector<Term>& terms, const Contr
     sum += std::visit([&](const auto& t) { return TermCost(t, view, net); }, term);
   }
   return sum;
-}
-
-double LargestMove(const ControlNet& a, const ControlNet& b) {
-  double largest = 0;
-  for (std::size_t k = 0; k < a.vertices.size(); ++k) {
-    largest = std::max(largest, (a.vertices[k] - b.vertices[k]).norm());
-  }
-  return largest;
 }
 
 class EachLoss : public ::testing::TestWithParam<std::pair<RobustLoss, double>> {};

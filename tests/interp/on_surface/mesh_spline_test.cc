@@ -12,6 +12,7 @@
 #include "interp/schemes/harmonic.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
+#include "surfaces/mesh/mesh_primitives.h"
 #include "tests/testing/dowel_scenes.h"
 
 namespace semblance::interp {
@@ -68,11 +69,7 @@ TEST(MeshLaplacian, StaysFiniteAndNegativeOffTheDiagonalOnSliversAndDegenerateTr
 
 TEST(LabelPieces, AreThoseOfTheTriangles) {
   TriMesh mesh = Plate(10, 2);
-  const TriMesh other = Plate(10, 1);
-  for (const Triangle& t : other.triangles) {
-    mesh.triangles.push_back({t[0] + 9, t[1] + 9, t[2] + 9});
-  }
-  mesh.points.insert(mesh.points.end(), other.points.begin(), other.points.end());
+  Append(mesh, Plate(10, 1));
   mesh.points.emplace_back(0, 0, 9);
   EXPECT_THAT(LabelPieces(BuildLaplacian(mesh).stiffness),
               ::testing::ElementsAre(0, 0, 0, 0, 0, 0, 0, 0, 0, 1, 1, 1, 1, 2));

@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_primitives.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/shapes.h"
 
@@ -58,11 +59,7 @@ TEST(TriMesh, EdgeDefectsAreCounted) {
 TEST(TriMesh, TwoSpheresAreTwoComponentsAndEachCanBeTaken) {
   TriMesh both = SphereMesh({0, 0, 0}, 1, 8);
   const TriMesh second = SphereMesh({5, 0, 0}, 2, 8);
-  const auto offset = static_cast<std::int32_t>(both.points.size());
-  both.points.insert(both.points.end(), second.points.begin(), second.points.end());
-  for (const Triangle& t : second.triangles) {
-    both.triangles.push_back({t[0] + offset, t[1] + offset, t[2] + offset});
-  }
+  Append(both, second);
   const Components components = ConnectedComponents(both);
   ASSERT_EQ(components.count, 2);
   std::vector<bool> keep;
