@@ -130,7 +130,7 @@ inline TriMesh Shuffled(const TriMesh& mesh) {
 
 }  // namespace semblance::testing
 
-namespace semblance::problems {
+namespace semblance::surfaces {
 
 // The enclosed volume, mm^3; > 0 if the mesh is closed and outward. For an open mesh it depends on
 // the origin.
@@ -142,4 +142,4 @@ inline double SignedVolume(const TriMesh& mesh) {
   return six_volumes / 6;
 }
 
-}  // namespace semblance::problems
+}  // namespace semblance::surfaces
