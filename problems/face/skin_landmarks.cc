@@ -116,7 +116,7 @@ void CheckOnce(const SkinLandmarks& landmarks) {
 SkinLandmarks ReadSkinLandmarks(std::span<const fs::path> files) {
   SkinLandmarks landmarks;
   for (const fs::path& file : files) {
-    if (LowerExtension(file) == ".csv") {
+    if (LowerCase(file.extension().string()) == ".csv") {
       ReadCsv(file, landmarks);
     } else {
       ReadSkullLandmarks(file, landmarks);

@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "problems/io/manifest.h"
+#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
