@@ -22,9 +22,9 @@ PYBIND11_MODULE(semblance, module) {
       "Faces from skulls: H-splines, fits of scattered points, depths between depth markers, "
       "experiments and studies. Lengths are in mm. Arrays are NumPy arrays of doubles.";
   module.attr("__version__") = SEMBLANCE_VERSION;
-  problems::BindErrors(module);
-  problems::BindSurface(module);
-  problems::BindFit(module);
-  problems::BindInterpolation(module);
-  problems::BindExperiments(module);
+  semblance::problems::BindErrors(module);
+  semblance::problems::BindSurface(module);
+  semblance::problems::BindFit(module);
+  semblance::problems::BindInterpolation(module);
+  semblance::problems::BindExperiments(module);
 }
