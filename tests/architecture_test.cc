@@ -80,7 +80,7 @@ const std::set<std::string> kFrontDoors = {"surfaces/implicit_face", "interp/int
                                            "fitting/fit", "problems/run"};
 
 // A module with fewer files belongs into another one. A folder with more is split into subfolders.
-constexpr int kMinFiles = 3, kMaxFiles = 45;
+constexpr int kMinFiles = 2, kMaxFiles = 45;
 
 // Where a library may be included: a regular expression over the path of the including file.
 const std::map<std::string, std::string> kLibraryPlaces = {

@@ -11,7 +11,7 @@
 
 #include "interp/dowels/dowel_network.h"
 #include "problems/config/spelling_suggestion.h"
-#include "problems/experiment/dowel_placement.h"
+#include "problems/experiment/dowel_projection.h"
 #include "problems/face/template_source.h"
 #include "problems/subject/condition_depths.h"
 #include "problems/subject/sites.h"

@@ -12,7 +12,7 @@
 #include <type_traits>
 #include <utility>
 
-#include "problems/experiment/dowel_placement.h"
+#include "problems/experiment/dowel_projection.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/face/edit_script.h"
 #include "problems/face/hspline_prior.h"

@@ -9,7 +9,7 @@
 #include <string>
 #include <type_traits>
 
-#include "problems/experiment/dowel_placement.h"
+#include "problems/experiment/dowel_projection.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/extra_dowels.h"
 #include "problems/io/manifest.h"

@@ -107,7 +107,7 @@ constexpr const char* kBeforeSites = R"md(# The sites
 A site is a point of the skull by which tissue depth is known: there a dowel stands. Left and right are the subject's. A landmarks' file names a site
 by its code, its number with the side (`18l`), or a name (`left gonion`); upper and lower case make no difference.
 
-This page is made by `semblance landmarks page configs/tables/*.yaml --out docs --force`; a test holds it and the program against each other.
+This page is made by `semblance landmarks page configs/tables/*.yaml --out docs/reference --force`; a test holds it and the program against each other.
 
 ![the sites on a phantom's skull, by number]({})
 

@@ -9,7 +9,6 @@
 #include <limits>
 #include <numbers>
 
-#include "problems/face/shape_model/shape_model.h"
 #include "problems/subject/propose/skull_pose.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/quantile.h"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "problems/experiment/dowel_placement.h"
+#include "problems/experiment/dowel_projection.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
