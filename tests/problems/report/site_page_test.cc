@@ -38,7 +38,8 @@ std::string LineOf(const std::string& page, const std::string& begin) {
 
 TEST(SitePage, ThePageInTheDocsIsTheOneThatTheProgramMakes) {
   EXPECT_EQ(ReadFileBytes(kSource + "/docs/reference/sites.md"), SitePage(Tables(), "sites.svg"))
-      << "make it again: semblance landmarks page configs/tables/*.yaml --out docs/reference --force";
+      << "make it again: semblance landmarks page configs/tables/*.yaml --out docs/reference "
+         "--force";
   EXPECT_GT(ReadFileBytes(kSource + "/docs/reference/sites.svg").size(), 10000u);
 }
 
