@@ -23,7 +23,7 @@ rows = table if isinstance(table, list) else table.to_dict("records")
 errors_mm = collections.defaultdict(list)
 for row in rows:
     if row["metric"] == "depth_truth.along_direction.rms_mm":
-        errors_mm[row["interp"]].append(row["value"])
+        errors_mm[row["interp"]].append(float(row["value"]))
 for scheme, values in sorted(errors_mm.items(), key=lambda item: statistics.mean(item[1])):
     print(f"{scheme:14s} {statistics.mean(values):.3f} mm over {len(values)} heads")
 assert len(errors_mm) == 3

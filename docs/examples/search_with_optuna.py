@@ -44,7 +44,7 @@ def work(given, job):
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--trials", type=int, default=6, help="number of trials, those of earlier calls included")
+    parser.add_argument("--trials", type=int, default=4, help="number of trials, those of earlier calls included")
     parser.add_argument("--jobs", type=int, default=2, help="number of processes")
     parser.add_argument("--phantoms", type=int, default=1, help="number of phantoms; the search minimises their mean RMS error")
     parser.add_argument("--storage", default="search.db", help="SQLite file")
