@@ -95,7 +95,7 @@ TEST(Invesalius, EachFaultIsNamed) {
   const std::string longest_side = "<integer>4096</integer>";
   EXPECT_THAT(words({{"main.plist", Plist("int16", longest_side + longest_side + longest_side)},
                      {"matrix.dat", Values()}}),
-              HasSubstr("at longest_side 8 GB are read"));
+              HasSubstr("at most 8 GB are read"));
   const std::string large = "<integer>500</integer>";
   EXPECT_THAT(
       words({{"main.plist", Plist("int16", large + large + large)}, {"matrix.dat", Values()}}),
