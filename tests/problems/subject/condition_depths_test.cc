@@ -140,7 +140,7 @@ TEST(ConditionDepths, AKnownDepthIsUsedIfTheTableLacksTheSite) {
   EXPECT_THAT(on_depths, Contains(HasSubstr("fe_l (Frontal Eminence): no table has a depth; the "
                                             "known depth of 4 mm is used")));
   EXPECT_THAT(on_depths, Contains(HasSubstr("dowel left out")).Times(1));
-  EXPECT_THAT(on_known, Contains(HasSubstr("fe_l, fe_r tells nothing of the others")));
+  EXPECT_THAT(on_known, Contains(HasSubstr("fe_l, fe_r does not change the other depths")));
 }
 
 TEST(ConditionDepths, MeasuredDepthsComeFromTheLandmarks) {

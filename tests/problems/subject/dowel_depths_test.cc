@@ -97,7 +97,7 @@ TEST(FillDepths, AddsDeviationsIfTheTableHasThem) {
   options = FromTable("rhine_caucasoid", Sex::kFemale, Build::kObese);
   options.sds = 1;
   EXPECT_THAT(FillDepths(options, s.file, s.dowels),
-              ElementsAre(HasSubstr("states no standard deviation for g, go_l")));
+              ElementsAre(HasSubstr("has no standard deviation for g, go_l")));
   EXPECT_THAT(s.Depths()[1], 17.5);
 }
 

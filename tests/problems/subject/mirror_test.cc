@@ -164,7 +164,7 @@ TEST(PrepareMirrored, NotesInventedBoneAndMirrorsTheLandmarkThere) {
   EXPECT_THAT(PrepareMirrored({}, skull, origin, file, 1), IsEmpty());
   EXPECT_EQ(skull.points, before.points);
   const auto notes = PrepareMirrored({.missing = true}, skull, origin, file, 1);
-  EXPECT_THAT(notes, Contains(HasSubstr("cm² of bone that the left side lacks are the mirror")));
+  EXPECT_THAT(notes, Contains(HasSubstr("cm² of bone that the left side lacks are mirrored")));
   EXPECT_THAT(notes,
               Contains(HasSubstr("sites im_l are mirrored with it")));  // go_l: bone is there
   EXPECT_EQ(origin.size(), skull.triangles.size());
