@@ -98,7 +98,7 @@ TEST_F(InputCheckTest, RulesAndSitesOfAPhantomAreChecked) {
               Contains(HasSubstr("landmarks.keep leaves 2 of 32")));
   const std::string uv = "sites: {g: {uv: [0.5, 0.6]}}\ntemplate: ict\n";
   EXPECT_THAT(Look(base + uv + "face: prior\n").faults,
-              Contains(HasSubstr("sites.g.uv: `face: prior` has a place of its own")));
+              Contains(HasSubstr("sites.g.uv: `face: prior` has its own place")));
   EXPECT_THAT(Look(base + uv).faults, IsEmpty());
   EXPECT_THAT(Look(base + "face: placed\nrounds: 2\n").warnings,
               Contains(HasSubstr("rounds: `face: placed` does not use it")));
