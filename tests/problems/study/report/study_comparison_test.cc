@@ -77,7 +77,7 @@ TEST(StudyComparison, TheDifferenceIsAMeanOverCommonSubjects) {
   EXPECT_EQ(pair.better + pair.worse, 7);
   EXPECT_TRUE(pair.same_label);
   EXPECT_THAT(comparison.notes,
-              Contains(HasSubstr("a: left out, for they are not in all the studies: 2 subjects")));
+              Contains(HasSubstr("a: left out because not all studies have them: 2 subjects")));
 }
 
 TEST(StudyComparison, ACopyDoesNotDifferAndSwappingTurnsTheSign) {
