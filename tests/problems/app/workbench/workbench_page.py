@@ -362,7 +362,7 @@ def work(browser, program, config, folder, pictures):
 
 def expect_reports_on_a_phone(browser, program, url, folder):
     """The reports of the run and of a fit: which headings are open, and no sideways scrolling."""
-    points = os.path.join(os.path.dirname(__file__), "..", "..", "..", "configs", "fit", "points.csv")
+    points = os.path.join(os.path.dirname(__file__), "..", "..", "..", "..", "configs", "fit", "points.csv")
     fit = os.path.abspath(os.path.join(os.path.dirname(folder), "fit"))
     subprocess.run([program, "fit", points, "--out", fit, "--quiet"], check=True, stdout=subprocess.DEVNULL)
     for report, heads in ((url + "run/report.html", ["In three dimensions", "In figures"]),
