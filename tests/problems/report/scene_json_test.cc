@@ -118,7 +118,7 @@ TEST(CollectScenes, RefusesAnInvalidScene) {
   EXPECT_THAT(WordsOf<IoError>([] {
                 CollectScenes({{"a", "nonsense"}}, 1);
               }),
-              ::testing::HasSubstr("no scene"));
+              ::testing::HasSubstr("not the scene of a run"));
 }
 
 }  // namespace
