@@ -39,6 +39,7 @@
 //   7. every_ does not grow from round to round, because the number of vertices does not fall.
 //   8. All sums are in the order of the curve, so the given order of the points has no effect.
 #include "fitting/nested/nested_fit.h"
+#include "fitting/nested/nested_points.h"
 
 #include <fmt/format.h>
 

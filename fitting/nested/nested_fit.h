@@ -8,13 +8,14 @@
 #include <string>
 #include <vector>
 
-#include "fitting/nested/nested_points.h"
 #include "fitting/problem/fit_schedule.h"
 #include "fitting/problem/fit_target.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance::fitting {
+
+struct NestedPoints;  // nested_points.h
 
 struct NestedRound {
   int finest = -1;                   // level

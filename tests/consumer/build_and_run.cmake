@@ -7,7 +7,7 @@ execute_process(COMMAND ${CMAKE_COMMAND} --install ${BUILD} --prefix ${OUT}/pref
 if(NOT EXISTS ${OUT}/prefix/include/semblance/fitting/fit.h)
   message(FATAL_ERROR "fitting/fit.h is not installed")
 endif()
-foreach(module space)  # internals of the solver; no public header includes them
+foreach(module least_squares space)  # internals of the solver; no public header includes them
   file(GLOB private ${OUT}/prefix/include/semblance/fitting/${module}/*)
   if(private)
     message(FATAL_ERROR "a private header is installed: ${private}")

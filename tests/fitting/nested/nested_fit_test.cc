@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The nested fit on known surfaces.
 #include "fitting/nested/nested_fit.h"
+#include "fitting/nested/nested_points.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
