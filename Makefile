@@ -122,7 +122,7 @@ check: build headers tidy configs
 
 # Each header compiles alone; in a build without precompiled headers its own source proves that for most.
 headers: build
-	@cmake --build --preset $(PRESET) --target all_verify_interface_header_sets
+	@cmake --build --preset $(PRESET) --target semblance_headers
 
 # clang-tidy on the sources changed since BASE, a commit. clang cannot read g++'s precompiled headers and rejects its memory options.
 tidy: setup
