@@ -1,11 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/io/output_folder.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cerrno>
 #include <system_error>
 #include <utility>
 
@@ -17,8 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string Reason(int error_number) { return std::generic_category().message(error_number); }
-
 void CreateFolders(const fs::path& folder) {
   std::error_code error;
   fs::create_directories(folder, error);
@@ -26,6 +21,16 @@ void CreateFolders(const fs::path& folder) {
     throw IoError(fmt::format("{}: the folder cannot be created: {}; choose another one",
                               folder.string(),
                               error ? error.message() : std::string("a file of this name exists")));
+  }
+}
+
+void RefuseLink(const fs::path& folder) {
+  std::error_code ignored;
+  if (fs::is_symlink(folder, ignored)) {
+    throw IoError(fmt::format(
+        "{}: it is a link, and files are written only into the output folder itself; replace the "
+        "link by a folder, or choose another output folder",
+        folder.string()));
   }
 }
 
@@ -52,16 +57,12 @@ void RefuseIfNotEmpty(const fs::path& folder) {
 }
 
 void TestWriting(const fs::path& folder) {
-  const fs::path probe = folder / fmt::format(".semblance-probe.{}-0.tmp", ::getpid());
-  const int descriptor = ::open(probe.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  if (descriptor < 0) {
+  if (const std::string reason = FindWritingFault(folder); !reason.empty()) {
     throw IoError(fmt::format(
         "{}: the output folder cannot be written to: {}; change its permissions or choose another "
         "folder",
-        folder.string(), Reason(errno)));
+        folder.string(), reason));
   }
-  ::close(descriptor);
-  ::unlink(probe.c_str());
 }
 
 bool StaysInside(const fs::path& name) {
@@ -87,9 +88,8 @@ fs::path OutputFolder::MakePath(std::string_view name) const {
         "'{}': not a file name inside the output folder {}; give a relative path without '..'",
         name, root_.string()));
   }
-  const fs::path path = root_ / name;
-  CreateFolders(path.parent_path());
-  return path;
+  MakeFolderBelow(root_, fs::path(name).parent_path());
+  return root_ / name;
 }
 
 void OutputFolder::Write(std::string_view name, std::string_view bytes, Durability durability) {
@@ -99,6 +99,20 @@ void OutputFolder::Write(std::string_view name, std::string_view bytes, Durabili
   }
   WriteFileAtomically(path, bytes, durability);
   written_.emplace_back(name);
+}
+
+void RefuseLinksBelow(const fs::path& root, const fs::path& name) {
+  fs::path folder = root;
+  for (const fs::path& part : name.lexically_normal()) {
+    folder /= part;
+    RefuseLink(folder);
+  }
+}
+
+fs::path MakeFolderBelow(const fs::path& root, const fs::path& name) {
+  RefuseLinksBelow(root, name);
+  CreateFolders(root / name);
+  return root / name;
 }
 
 std::string PlainName(const std::filesystem::path& path) {

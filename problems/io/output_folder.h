@@ -33,8 +33,8 @@ class OutputFolder {
   const std::vector<std::string>& Written() const { return written_; }
 
   // Returns Root() / name, e.g. for "pictures/front.png"; creates the folders in between. Throws
-  // InputError if `name` is empty, absolute or leads out of the folder, IoError if a folder cannot
-  // be created.
+  // InputError if `name` is empty, absolute or leads out of the folder, IoError like
+  // MakeFolderBelow.
   std::filesystem::path MakePath(std::string_view name) const;
 
   // WriteFileAtomically(MakePath(name), bytes, durability).
@@ -45,6 +45,16 @@ class OutputFolder {
   std::vector<std::string> written_;
   std::filesystem::path root_;
 };
+
+// Throws IoError if a folder on the way from `root` to `root / name` is a link, because somebody
+// else may have put it there to lead files elsewhere. `root` itself may be a link: the user named
+// it. `name` is relative and has no "..".
+void RefuseLinksBelow(const std::filesystem::path& root, const std::filesystem::path& name);
+
+// Creates the folder `root / name` with its parents and returns it. Throws IoError like
+// RefuseLinksBelow, or if a folder cannot be created.
+std::filesystem::path MakeFolderBelow(const std::filesystem::path& root,
+                                      const std::filesystem::path& name);
 
 // The name of a file or folder without its endings: `head` for head.nii.gz, head.ply and head/.
 std::string PlainName(const std::filesystem::path& path);

@@ -27,6 +27,17 @@ namespace fs = std::filesystem;
                             std::generic_category().message(errno)));
 }
 
+// A folder that another user has prepared stays his: he could replace the files in it at any time.
+void RefuseFolderOfOthers(int descriptor, const fs::path& folder, const std::string& what) {
+  struct stat open {};
+  if (::fstat(descriptor, &open) == 0 && open.st_uid != ::geteuid()) {
+    throw IoError(fmt::format(
+        "{}: another user of this machine has left {}; ask him to delete it, or choose another "
+        "folder",
+        what, folder.string()));
+  }
+}
+
 // True if `folder` is still the name of the open folder: its holder may have renamed it.
 bool HasStillName(int descriptor, const fs::path& folder) {
   struct stat open {
@@ -158,6 +169,9 @@ void FolderClaim::Take(const fs::path& folder, const std::string& what) {
     if (descriptor_ < 0 && errno != ENOENT) {  // ENOENT: it was renamed in between
       ThrowCannotCreate(what);
     }
+    if (!is_new) {
+      RefuseFolderOfOthers(descriptor_, folder, what);
+    }
     taken = descriptor_ >= 0 && TryToLock(is_new, what);
   }
   ClearFolder(folder);
@@ -265,6 +279,7 @@ void StagedFolder::MoveFiles() {
       KeepAndFail(fmt::format("{} is a file that was read", file.string()));
     }
   }
+  MakeFoldersFor(files);
   const std::vector<std::string> old = OldFiles(root_, given_, files);
   if (!files.empty()) {
     // The last file, e.g. the manifest, marks a complete folder, so an old one must not stay while
@@ -272,7 +287,6 @@ void StagedFolder::MoveFiles() {
     fs::remove(root_ / files.back(), error);
   }
   for (const fs::path& file : files) {
-    fs::create_directories((root_ / file).parent_path(), error);
     fs::rename(from / file, root_ / file, error);
     if (error) {
       KeepAndFail(fmt::format("{}: {}", file.string(), error.message()));
@@ -280,6 +294,16 @@ void StagedFolder::MoveFiles() {
   }
   RemoveFiles(root_, old);
   fs::remove_all(from, error);
+}
+
+void StagedFolder::MakeFoldersFor(const std::vector<fs::path>& files) {
+  try {
+    for (const fs::path& file : files) {
+      MakeFolderBelow(root_, file.parent_path());
+    }
+  } catch (const IoError& error) {
+    KeepAndFail(error.what());
+  }
 }
 
 void StagedFolder::KeepAndFail(const std::string& why) {

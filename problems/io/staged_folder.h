@@ -23,8 +23,9 @@ class FolderClaim {
   FolderClaim& operator=(const FolderClaim&) = delete;
 
   // Makes `folder`, or takes over one that a dead process has left, and clears it. `what` is the
-  // name of the claimed thing in messages. Throws IoError if another process has claimed it, or if
-  // it cannot be made. On a file system without locks an existing folder counts as claimed.
+  // name of the claimed thing in messages. Throws IoError if another process has claimed it, if
+  // another user made it, or if it cannot be made. A link of this name is not followed. On a file
+  // system without locks an existing folder counts as claimed.
   void Take(const std::filesystem::path& folder, const std::string& what);
   void Release();
 
@@ -72,6 +73,7 @@ class StagedFolder {
   bool RenameToRoot() const;
   void Undo();
   void MoveFiles();
+  void MakeFoldersFor(const std::vector<std::filesystem::path>& files);
   [[noreturn]] void KeepAndFail(const std::string& why);
 
   std::filesystem::path root_;

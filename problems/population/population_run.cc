@@ -11,6 +11,7 @@
 #include <optional>
 #include <system_error>
 
+#include "problems/io/output_folder.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
@@ -135,7 +136,7 @@ class PopulationRunner {
       : plan_(plan), folder_(std::move(folder)), options_(options), context_(context) {}
 
   PopulationRunSummary Run() {
-    fs::create_directories(folder_ / "subjects");
+    MakeFolderBelow(folder_, "subjects");
     for (std::size_t n = 0; n < plan_.entries.size(); ++n) {
       if (static_cast<int>(n % options_.shards) == options_.shard) {
         ++summary_.subjects;
@@ -248,7 +249,7 @@ std::vector<GatheredFrom> GatherSubjects(const PopulationPlan& plan, const fs::p
     RequireSubjectsIn(other);
     gathered.push_back({.folder = other});
   }
-  fs::create_directories(folder / "subjects");
+  MakeFolderBelow(folder, "subjects");
   for (GatheredFrom& from : gathered) {
     for (const PopulationEntry& entry : plan.entries) {
       const auto json = ReadSubject(from.folder, entry.id, plan);

@@ -235,7 +235,8 @@ class StudyRunner {
       stored[key] = value;
     }
     if (is_changed) {
-      WriteFileAtomically(TrialFolder(folder_, trial.id) / "trial.json", stored.dump(1) + "\n");
+      WriteFileAtomically(WritableTrialFolder(folder_, trial.id) / "trial.json",
+                          stored.dump(1) + "\n");
     }
   }
 
@@ -288,7 +289,7 @@ class StudyRunner {
       Fail(error.what(), json);
     }
     AppendProvenance(trial, input_hashes_, json);
-    OutputFolder output(TrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
+    OutputFolder output(WritableTrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
     write(output);
     std::vector<std::string> names = output.Written();
     std::erase(names, "timing.json");  // invariant 5

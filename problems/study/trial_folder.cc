@@ -180,6 +180,11 @@ class TrialHandler : public nlohmann::json_sax<Json> {
 
 fs::path TrialFolder(const fs::path& study, const std::string& id) { return study / "trials" / id; }
 
+fs::path WritableTrialFolder(const fs::path& study, const std::string& id) {
+  RefuseLinksBelow(study, fs::path("trials") / id);
+  return TrialFolder(study, id);
+}
+
 std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) {
   const fs::path file = TrialFolder(study, id) / kTrialFile;
   if (!FileExists(file)) {
@@ -234,7 +239,7 @@ std::string CopyTrial(const fs::path& from, const fs::path& to, const std::strin
   if (!fault.empty()) {
     return fault;
   }
-  StagedFolder copy(TrialFolder(to, id), WhenNotEmpty::kReplaceFiles);
+  StagedFolder copy(WritableTrialFolder(to, id), WhenNotEmpty::kReplaceFiles);
   for (const fs::path& name : files) {
     copy.Files().Write(name.generic_string(), ReadFileBytes(trial / name), Durability::kUnsynced);
   }

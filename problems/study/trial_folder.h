@@ -14,6 +14,11 @@ namespace semblance::problems {
 
 std::filesystem::path TrialFolder(const std::filesystem::path& study, const std::string& id);
 
+// The same folder, for writing. Throws IoError if it or trials/ is a link, which may lead out of
+// the study.
+std::filesystem::path WritableTrialFolder(const std::filesystem::path& study,
+                                          const std::string& id);
+
 // Reads the trial.json of a whole trial. Returns nothing if it is missing, cut short, or of another
 // trial, or if its status or reason is not a text.
 std::optional<nlohmann::ordered_json> ReadTrialFile(const std::filesystem::path& study,

@@ -4,12 +4,11 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <sys/file.h>
+#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <cctype>
 #include <cerrno>
 #include <cstdint>
 #include <fstream>
@@ -27,15 +26,38 @@ namespace fs = std::filesystem;
 
 std::string Reason(int error_number) { return std::generic_category().message(error_number); }
 
+constexpr std::string_view kTemporaryStart = ".semblance-", kTemporaryEnding = ".tmp";
+constexpr std::size_t kRandomDigits = 16;
+
+// The name is random, so that nobody can prepare a link of this name in a shared folder.
+fs::path RandomTemporaryName(const fs::path& folder) {
+  std::uint64_t random = 0;
+  if (::getrandom(&random, sizeof random, 0) != static_cast<ssize_t>(sizeof random)) {
+    throw IoError(fmt::format("{}: the system gives no random numbers, which temporary files need",
+                              folder.string()));
+  }
+  return folder / fmt::format("{}{:016x}{}", kTemporaryStart, random, kTemporaryEnding);
+}
+
+// Creates a file that nobody has created or linked before. Returns its descriptor, or -1 with the
+// reason in errno.
+int CreateTemporary(const fs::path& folder, fs::path& name) {
+  int descriptor = -1;
+  do {
+    name = RandomTemporaryName(folder);
+    descriptor = ::open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0666);
+  } while (descriptor < 0 && errno == EEXIST);
+  return descriptor;
+}
+
 // Owns a temporary file: closes its descriptor and removes the file unless it was renamed. The file
 // stays locked while it is written, so that a sweep leaves it alone.
 class TemporaryFile {
  public:
-  TemporaryFile(const fs::path& target, fs::path temporary)
-      : target_(target), temporary_(std::move(temporary)) {
+  explicit TemporaryFile(const fs::path& target) : target_(target) {
     do {
       Close();
-      descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+      descriptor_ = CreateTemporary(target.parent_path(), temporary_);
       if (descriptor_ < 0) {
         Fail();
       }
@@ -139,27 +161,15 @@ std::string ReadBytes(const fs::path& path) {
                             fs::file_size(path, ignored) >> 20));
 }
 
-// Removes the digits at the end of a name; false if there are none.
-bool RemoveDigits(std::string_view& name) {
-  const std::size_t before = name.size();
-  while (!name.empty() && std::isdigit(static_cast<unsigned char>(name.back())) != 0) {
-    name.remove_suffix(1);
-  }
-  return name.size() < before;
-}
-
-// Recognises the names that TemporaryBeside makes: ".face.ply.123-4.tmp".
+// Recognises the names that RandomTemporaryName makes.
 bool IsTemporaryName(std::string_view name) {
-  constexpr std::string_view kEnding = ".tmp";
-  if (!name.starts_with('.') || !name.ends_with(kEnding)) {
+  if (!name.starts_with(kTemporaryStart) || !name.ends_with(kTemporaryEnding)) {
     return false;
   }
-  name.remove_suffix(kEnding.size());
-  if (!RemoveDigits(name) || !name.ends_with('-')) {
-    return false;
-  }
-  name.remove_suffix(1);
-  return RemoveDigits(name) && name.ends_with('.') && name.size() > 2;
+  name.remove_prefix(kTemporaryStart.size());
+  name.remove_suffix(kTemporaryEnding.size());
+  return name.size() == kRandomDigits &&
+         name.find_first_not_of("0123456789abcdef") == std::string_view::npos;
 }
 
 // Removes the file unless a process has locked it.
@@ -176,7 +186,7 @@ void RemoveIfUnlocked(const fs::path& path) {
 }  // namespace
 
 void WriteFileAtomically(const fs::path& path, std::string_view bytes, Durability durability) {
-  TemporaryFile file(path, TemporaryBeside(path));
+  TemporaryFile file(path);
   file.Write(bytes);
   file.Rename(durability);
   if (durability == Durability::kSynced) {
@@ -201,10 +211,15 @@ std::string ReadFileBytes(const fs::path& path) {
   }
 }
 
-fs::path TemporaryBeside(const fs::path& path) {
-  static std::atomic<int> count{0};
-  return path.parent_path() /
-         fmt::format(".{}.{}-{}.tmp", path.filename().string(), ::getpid(), count++);
+std::string FindWritingFault(const fs::path& folder) {
+  fs::path probe;
+  const int descriptor = CreateTemporary(folder, probe);
+  if (descriptor < 0) {
+    return Reason(errno);
+  }
+  ::close(descriptor);
+  ::unlink(probe.c_str());
+  return "";
 }
 
 void SweepTemporaryFiles(const fs::path& folder) {

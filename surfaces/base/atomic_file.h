@@ -17,7 +17,10 @@ namespace semblance::surfaces {
 enum class Durability { kSynced, kUnsynced };
 
 // Writes `bytes` to a temporary file in the folder of `path`, syncs it, and renames it to `path`.
-// On failure throws IoError with the path and the system's reason; then `path` is unchanged and no
+// The temporary file is new and has a random name (".semblance-", 16 hexadecimal digits, ".tmp"),
+// so a link or file that somebody has put into a shared folder is never opened for writing. If
+// `path` itself is a link, the rename replaces the link, and the file behind it stays as it is. On
+// failure throws IoError with the path and the system's reason; then `path` is unchanged and no
 // temporary file remains.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes,
                          Durability durability = Durability::kSynced);
@@ -26,9 +29,9 @@ void WriteFileAtomically(const std::filesystem::path& path, std::string_view byt
 // system's reason.
 std::string ReadFileBytes(const std::filesystem::path& path);
 
-// Makes the name of a temporary file for `path`: "dir/.face.ply.123-4.tmp" for "dir/face.ply", with
-// the process number and a counter.
-std::filesystem::path TemporaryBeside(const std::filesystem::path& path);
+// Creates and removes a temporary file in `folder`. Returns the system's reason if this fails, else
+// "".
+std::string FindWritingFault(const std::filesystem::path& folder);
 
 // Removes the temporary files that killed processes left directly in `folder`. A file that a living
 // process still writes is locked (flock) and stays. All other files stay.

@@ -492,6 +492,7 @@ RunFace Bench::MakeRun(const Experiment& experiment, const RunContext& context, 
     stages = run_stages_;
   }
   const RunResult result = Run(experiment, context, stages.get());
+  RefuseLinksBelow(folder_.Root(), "run");
   StagedFolder staged(folder_.Root() / "run", WhenNotEmpty::kReplaceFiles);
   WriteRun(experiment, result, staged.Files(), context);
   const Lock lock(mutex_);

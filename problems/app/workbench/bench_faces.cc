@@ -11,6 +11,7 @@
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/make_face.h"
 #include "problems/face/edit_script.h"
+#include "problems/io/output_folder.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
@@ -146,7 +147,7 @@ Experiment VariantExperiment(const Experiment& experiment, BenchVariant variant,
 
 void StoreVariant(const fs::path& folder, BenchVariant variant, const VariantFace& made) {
   const VariantFiles files = FindVariantFiles(folder, variant);
-  fs::create_directories(files.face.parent_path());
+  MakeFolderBelow(folder, "variants");
   fs::remove(files.key);  // without a key, an incomplete face is never read
   WriteHSpline(files.face, made.face.surface);
   WriteFileAtomically(files.key, made.key);

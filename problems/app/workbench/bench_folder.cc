@@ -14,6 +14,7 @@
 #include "problems/config/config_tree.h"
 #include "problems/config/utf8_check.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/io/output_folder.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -109,7 +110,7 @@ void BenchFolder::CheckFree() const {
 void BenchFolder::Begin(const std::string& start, const BenchState& state) {
   for (const BenchAsset& file : StarterFiles()) {
     const fs::path path = root_ / file.name;
-    fs::create_directories(path.parent_path());
+    MakeFolderBelow(root_, fs::path(file.name).parent_path());
     if (!fs::exists(path)) {
       WriteFileAtomically(path, file.text);
     }
@@ -168,7 +169,7 @@ fs::path SaveIncoming(const fs::path& root, const std::string& batch, const std:
     path /= RequireSafeName(name.substr(from, slash - from));
     from = slash + 1;
   }
-  fs::create_directories(path.parent_path());
+  MakeFolderBelow(root, path.parent_path().lexically_relative(root));
   WriteFileAtomically(path, bytes);
   return path;
 }

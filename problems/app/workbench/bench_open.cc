@@ -237,7 +237,7 @@ class Additions {
 
   // Returns a free path below subject/.
   fs::path NewPath(const std::string& name) {
-    fs::create_directories(root_ / "subject");
+    MakeFolderBelow(root_, "subject");
     added_.push_back(FreePath(root_ / "subject" / name));
     return added_.back();
   }
@@ -260,7 +260,7 @@ class Additions {
 
  private:
   fs::path Move(const fs::path& from, const fs::path& to) {
-    fs::create_directories(to.parent_path());
+    MakeFolderBelow(root_, "subject");
     fs::rename(from, to);
     moved_.emplace_back(from, to);
     return to;

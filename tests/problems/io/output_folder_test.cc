@@ -5,11 +5,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/file.h>
+#include <sys/random.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <csignal>
+#include <cstdint>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <thread>
@@ -18,6 +22,18 @@
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
+
+// Replaces the system's random numbers by 1, 2, 3 ... while `random_count` is not negative.
+static std::int64_t random_count = -1;
+extern "C" ssize_t getrandom(void* buffer, size_t size, unsigned flags) {
+  if (random_count < 0) {
+    return ::syscall(SYS_getrandom, buffer, size, flags);
+  }
+  ++random_count;
+  std::memset(buffer, 0, size);
+  std::memcpy(buffer, &random_count, std::min(size, sizeof random_count));
+  return static_cast<ssize_t>(size);
+}
 
 namespace semblance::problems {
 namespace {
@@ -45,6 +61,58 @@ TEST_F(OutputFolderTest, WrittenBytesAreReadBackAndNoOtherFileRemains) {
   WriteFileAtomically(folder_ / "x.bin", "");
   EXPECT_EQ(ReadFileBytes(folder_ / "x.bin"), "");
   EXPECT_EQ(Count(folder_.Path()), 1);
+}
+
+// Somebody else has filled a shared folder with links and files of the temporary names.
+TEST_F(OutputFolderTest, PreparedLinksAreNeitherFollowedNorReplaced) {
+  std::ofstream(folder_ / "victim") << "precious";
+  fs::create_directory(folder_ / "shared");
+  for (int k = 1; k <= 3; ++k) {
+    fs::create_symlink(folder_ / "victim",
+                       folder_ / fmt::format("shared/.semblance-{:016x}.tmp", k));
+  }
+  fs::create_hard_link(folder_ / "victim", folder_ / "shared/.semblance-0000000000000004.tmp");
+  fs::create_symlink(folder_ / "none", folder_ / "shared/.semblance-0000000000000005.tmp");
+  for (const std::string& name :  // names of earlier versions
+       {fmt::format(".semblance-probe.{}-0.tmp", ::getpid()),
+        fmt::format(".x.bin.{}-0.tmp", ::getpid())}) {
+    fs::create_symlink(folder_ / "victim", folder_ / "shared" / name);
+  }
+  random_count = 0;
+  EXPECT_EQ(FindWritingFault(folder_ / "shared"), "");
+  EXPECT_EQ(random_count, 6);
+  random_count = 0;
+  WriteFileAtomically(folder_ / "shared/x.bin", "new");
+  EXPECT_EQ(random_count, 6);
+  random_count = -1;
+  EXPECT_EQ(ReadFileBytes(folder_ / "victim"), "precious");
+  EXPECT_EQ(ReadFileBytes(folder_ / "shared/x.bin"), "new");
+  EXPECT_FALSE(fs::exists(folder_ / "none"));
+  EXPECT_EQ(Count(folder_ / "shared"), 8);
+}
+
+TEST_F(OutputFolderTest, ALinkAtTheTargetIsReplacedAndItsFileStays) {
+  std::ofstream(folder_ / "victim") << "precious";
+  fs::create_symlink(folder_ / "victim", folder_ / "x");
+  WriteFileAtomically(folder_ / "x", "new");
+  EXPECT_FALSE(fs::is_symlink(folder_ / "x"));
+  EXPECT_EQ(ReadFileBytes(folder_ / "x"), "new");
+  EXPECT_EQ(ReadFileBytes(folder_ / "victim"), "precious");
+}
+
+TEST_F(OutputFolderTest, ALinkBelowTheFolderLeadsNowhere) {
+  fs::create_directories(folder_ / "elsewhere");
+  fs::create_directories(folder_ / "out/deep");
+  fs::create_directory_symlink(folder_ / "elsewhere", folder_ / "out/pictures");
+  fs::create_directory_symlink(folder_ / "elsewhere", folder_ / "out/deep/pictures");
+  OutputFolder out(folder_ / "out", WhenNotEmpty::kReplaceFiles);
+  for (const char* name : {"pictures/a.png", "deep/pictures/a.png", "pictures/more/a.png"}) {
+    EXPECT_THAT(WordsOf<IoError>([&] { out.Write(name, "png"); }), HasSubstr("it is a link"));
+  }
+  EXPECT_EQ(Count(folder_ / "elsewhere"), 0);
+  fs::create_directory_symlink(folder_ / "elsewhere", folder_ / "named");
+  OutputFolder(folder_ / "named", WhenNotEmpty::kRefuse).Write("deep/a.png", "png");
+  EXPECT_EQ(ReadFileBytes(folder_ / "elsewhere/deep/a.png"), "png") << "the user named this link";
 }
 
 TEST_F(OutputFolderTest, MissingFolderIsOneClearError) {
@@ -94,16 +162,20 @@ TEST_F(OutputFolderTest, APipeIsReadToItsEnd) {
 }
 
 TEST_F(OutputFolderTest, OnlyFilesOfAKilledProcessAreSwept) {
-  for (const char* name : {".face.ply.123-4.tmp", ".a.1-0.tmp"}) {
+  for (const char* name : {".semblance-0123456789abcdef.tmp", ".semblance-00000000000000ff.tmp"}) {
     std::ofstream(folder_ / name) << "half";
   }
-  const std::vector<std::string> others = {"face.ply",  ".face.ply.tmp",  ".1-2.tmp",
-                                           "x.1-2.tmp", ".x.1-2.tmp.bak", ".x.-2.tmp",
-                                           ".x.1-.tmp"};
+  const std::vector<std::string> others = {"face.ply",
+                                           ".semblance-0123456789abcde.tmp",
+                                           ".semblance-0123456789abcdefg.tmp",
+                                           ".semblance-0123456789abcdeF.tmp",
+                                           "x.semblance-0123456789abcdef.tmp",
+                                           ".semblance-0123456789abcdef.tmp.bak",
+                                           ".semblance-part"};
   for (const std::string& name : others) {
     std::ofstream(folder_ / name) << "mine";
   }
-  fs::create_symlink("face.ply", folder_ / ".link.1-2.tmp");
+  fs::create_symlink("face.ply", folder_ / ".semblance-1111111111111111.tmp");
   OutputFolder out(folder_.Path(), WhenNotEmpty::kReplaceFiles);
   out.Write("face.ply", "new");
   EXPECT_EQ(Count(folder_.Path()), static_cast<int>(others.size()) + 1);
@@ -111,7 +183,8 @@ TEST_F(OutputFolderTest, OnlyFilesOfAKilledProcessAreSwept) {
 }
 
 TEST_F(OutputFolderTest, ATemporaryFileThatIsBeingWrittenIsNotSwept) {
-  const int descriptor = ::open((folder_ / ".x.1-2.tmp").c_str(), O_WRONLY | O_CREAT, 0600);
+  const int descriptor =
+      ::open((folder_ / ".semblance-2222222222222222.tmp").c_str(), O_WRONLY | O_CREAT, 0600);
   ASSERT_EQ(::flock(descriptor, LOCK_EX), 0);
   SweepTemporaryFiles(folder_.Path());
   EXPECT_EQ(Count(folder_.Path()), 1);

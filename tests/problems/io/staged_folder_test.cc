@@ -163,6 +163,36 @@ TEST(StagedFolder, TheFolderOfAKilledProcessIsTakenOver) {
   }
 }
 
+TEST(StagedFolder, ALinkInTheFolderLeadsNoFileElsewhere) {
+  const ScratchFolder folder;
+  fs::create_directories(folder / "elsewhere");
+  fs::create_directories(folder / "out");
+  std::ofstream(folder / "out/mine.txt") << "mine";
+  fs::create_directory_symlink(folder / "elsewhere", folder / "out/pictures");
+  StagedFolder staged(folder / "out", WhenNotEmpty::kReplaceFiles);
+  Fill(staged);
+  EXPECT_THAT(WordsOf<IoError>([&] { staged.Publish(); }),
+              AllOf(HasSubstr("out/pictures: it is a link"), HasSubstr("out.kept-1")));
+  EXPECT_TRUE(fs::is_empty(folder / "elsewhere"));
+  EXPECT_EQ(NamesIn(folder / "out.kept-1"), kAll) << "the result is not lost";
+}
+
+TEST(StagedFolder, APreparedStagingFolderIsNotUsed) {
+  const ScratchFolder folder;
+  fs::create_directories(folder / "elsewhere");
+  std::ofstream(folder / "elsewhere/mine.txt") << "mine";
+  fs::create_directory_symlink(folder / "elsewhere", folder / ".out.semblance-part");
+  EXPECT_THROW(StagedFolder(folder / "out", WhenNotEmpty::kRefuse), IoError);
+  EXPECT_EQ(NamesIn(folder / "elsewhere"), Names{"mine.txt"});
+  if (::geteuid() != 0) {
+    GTEST_SKIP() << "only root can make a folder of another user";
+  }
+  fs::create_directories(folder / ".b.semblance-part");
+  ASSERT_EQ(::chown((folder / ".b.semblance-part").c_str(), 12345, 12345), 0);
+  EXPECT_THAT(WordsOf<IoError>([&] { StagedFolder(folder / "b", WhenNotEmpty::kRefuse); }),
+              HasSubstr("another user of this machine has left"));
+}
+
 TEST(StagedFolder, AnInputFileIsRefusedUnderAnyNameBeforeWork) {
   const ScratchFolder folder;
   fs::create_directories(folder / "out/pictures");

@@ -247,8 +247,8 @@ TEST(RefuseOtherFolder, AcceptsOnlyThisPopulation) {
   RefuseOtherFolder(plan, folder / "missing");
   // Another shard has just created the folder.
   fs::create_directories(folder / "begun/subjects");
-  WriteFileAtomically(folder / "begun/.semblance-probe.7-0.tmp", "");
-  WriteFileAtomically(folder / "begun/subjects/.1234.json.7-0.tmp", "");
+  WriteFileAtomically(folder / "begun/.semblance-00000000000000a7.tmp", "");
+  WriteFileAtomically(folder / "begun/subjects/.semblance-0123456789abcdef.tmp", "");
   RefuseOtherFolder(plan, folder / "begun");
   fs::create_directories(folder / "foreign");
   WriteFileAtomically(folder / "foreign/report.html", "a study's");

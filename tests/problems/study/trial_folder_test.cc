@@ -99,6 +99,20 @@ TEST_F(TrialFolders, NoLinkIsFollowedOutOfATrial) {
   ExpectNotTaken("it is a link");
 }
 
+TEST_F(TrialFolders, NoTrialIsWrittenThroughALink) {
+  fs::create_directories(folder_ / "elsewhere");
+  for (const char* place : {"to/trials/a", "to/trials"}) {
+    fs::remove_all(folder_ / "to");
+    fs::create_directories((folder_ / place).parent_path());
+    fs::create_directory_symlink(folder_ / "elsewhere", folder_ / place);
+    EXPECT_THROW(WritableTrialFolder(folder_ / "to", "a"), IoError) << place;
+    EXPECT_THROW(Copy(), IoError) << place;
+  }
+  EXPECT_TRUE(fs::is_empty(folder_ / "elsewhere"));
+  fs::remove_all(folder_ / "to");
+  EXPECT_EQ(WritableTrialFolder(folder_ / "to", "a"), folder_ / "to/trials/a");
+}
+
 TEST_F(TrialFolders, AnIncompleteTrialDoesNotExist) {
   for (const char* text : {"", "{", "[]", "{\"id\": \"b\"}", "{\"id\": 1}",
                            "{\"id\": \"a\", \"status\": 3}", "{\"id\": \"a\", \"reason\": []}"}) {
