@@ -79,13 +79,16 @@ int Edit(const FaceArguments& a) {
   const std::array<fs::path, 2> given = {a.face, a.script};
   CheckFree(a.out, a, given);
   RefuseSameName(a.out, a.inverse);
-  HSplineSurface face = ReadHSpline(a.face);
-  const EditScript inverse = ApplyScript(a.script, face);
   if (!a.inverse.empty()) {
     CheckFree(a.inverse, a, given);
-    WriteFileAtomically(a.inverse, WriteConfig(inverse));
   }
-  WriteHSpline(a.out, face);
+  HSplineSurface face = ReadHSpline(a.face);
+  const EditScript inverse = ApplyScript(a.script, face);
+  std::vector<FileBytes> files = {{a.out, HSplineToJson(face)}};
+  if (!a.inverse.empty()) {
+    files.push_back({a.inverse, WriteConfig(inverse)});
+  }
+  WriteFilesTogether(files);
   fmt::print("{}: {} vertices changed\n", a.out, inverse.edits.size());
   return kDone;
 }

@@ -65,9 +65,12 @@ int Page(const LandmarkArguments& a) {
     throw IoError(
         fmt::format("{}: sites.md or sites.svg exists; add --force to replace it", a.out));
   }
-  fs::create_directories(a.out);
-  WriteFileAtomically(page, SitePage(tables, picture.filename().string()));
-  WriteFileAtomically(picture, SitePictureSvg(/*threads=*/1));
+  const std::array<FileBytes, 2> files = {
+      FileBytes{page, SitePage(tables, picture.filename().string())},
+      FileBytes{picture, SitePictureSvg(/*threads=*/1)}};
+  NewFolders made(a.out);
+  WriteFilesTogether(files);
+  made.Keep();
   fmt::print("{}\n", page.string());
   return kDone;
 }
@@ -124,11 +127,10 @@ void PrintDifferences(const ProposeArguments& a, const LandmarkFile& file) {
 void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {
   const std::string bytes = EncodeLandmarks(file, out);
   PrintEach(LostContents(file, out), "not kept in this kind of file");
-  if (const fs::path folder = fs::path(out).parent_path(); !folder.empty()) {
-    fs::create_directories(folder);
-  }
-  RefuseExisting(out, a.force);
+  RefuseExisting(out, a.force);  // it may have appeared during the work
+  NewFolders made(fs::absolute(out).parent_path());
   WriteFileAtomically(out, bytes);
+  made.Keep();
   fmt::print(
       "{}: {} sites proposed, {} absent, mm, {}. Check each on the skull and correct it; then "
       "set `proposed: false`\n",

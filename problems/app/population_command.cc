@@ -151,8 +151,10 @@ int PopulationCommand(const PopulationArguments& a) {
   if (!a.force) {
     RefuseOtherFolder(plan, root);
   }
+  NewFolders made(root);
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   PrintGathered(GatherSubjects(plan, root, {a.from.begin(), a.from.end()}), plan);
+  made.Keep();
   const PopulationRunSummary summary = MeasureWithProgress(plan, root, a);
   if (const Shard shard = ParseShard(a.shard); shard.count > 1) {
     return PrintShardState(summary, SelectShard(plan, shard), root);

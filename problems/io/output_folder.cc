@@ -14,16 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void CreateFolders(const fs::path& folder) {
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (error || !fs::is_directory(folder)) {
-    throw IoError(fmt::format("{}: the folder cannot be created: {}; choose another one",
-                              folder.string(),
-                              error ? error.message() : std::string("a file of this name exists")));
-  }
-}
-
 void RefuseLink(const fs::path& folder) {
   std::error_code ignored;
   if (fs::is_symlink(folder, ignored)) {
@@ -74,7 +64,7 @@ bool StaysInside(const fs::path& name) {
 }  // namespace
 
 OutputFolder::OutputFolder(fs::path root, WhenNotEmpty when_not_empty) : root_(std::move(root)) {
-  CreateFolders(root_);
+  NewFolders(root_).Keep();
   if (when_not_empty == WhenNotEmpty::kRefuse) {
     RefuseIfNotEmpty(root_);
   }
@@ -111,7 +101,7 @@ void RefuseLinksBelow(const fs::path& root, const fs::path& name) {
 
 fs::path MakeFolderBelow(const fs::path& root, const fs::path& name) {
   RefuseLinksBelow(root, name);
-  CreateFolders(root / name);
+  NewFolders(root / name).Keep();
   return root / name;
 }
 

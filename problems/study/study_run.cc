@@ -475,12 +475,14 @@ void RequireSamePlan(const fs::path& folder, const std::vector<fs::path>& others
 
 StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
                       const RunContext& context) {
-  SelectTrials(plan, options.only);  // both throw before anything is written
-  OpenDiskCache(options);
+  SelectTrials(plan, options.only);
+  NewFolders made(folder);
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
   const StoredPlan stored = ReadStoredPlan(folder);
   const bool changed = IsChanged(stored, plan, folder);
+  OpenDiskCache(options);  // the last of those that throw before anything is written
   StudyRunner runner(plan, folder, options, context);
+  made.Keep();
   output.Write("plan.json", PlanJson(plan));
   runner.Run();
   StudySummary summary = runner.summary();

@@ -47,6 +47,10 @@ std::string SubmitScript(const SubmitOptions& o) {
 
 fs::path SubmitStudy(const SubmitOptions& options) {
   OutputFolder folder(options.folder, WhenNotEmpty::kReplaceFiles);
+  for (int shard = 0; shard < options.shards; ++shard) {  // Slurm would follow a link
+    RefuseLinksBelow(folder.Root(), fmt::format("slurm-shard-{}.log", shard));
+  }
+  RefuseLinksBelow(folder.Root(), "slurm-merge.log");
   folder.Write("submit.sh", SubmitScript(options));
   const fs::path script = folder.Root() / "submit.sh";
   if (std::system("command -v sbatch > /dev/null 2>&1") != 0) {

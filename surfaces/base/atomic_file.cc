@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <cstdint>
 #include <fstream>
+#include <list>
 #include <new>
 #include <stdexcept>
 #include <system_error>
@@ -83,10 +84,18 @@ class TemporaryFile {
     }
   }
 
+  void Sync() const {
+    if (::fsync(descriptor_) != 0) {
+      Fail();
+    }
+  }
+
   // The last step: afterwards the target holds the new bytes.
   void Rename(Durability durability) {
-    const bool sync = durability == Durability::kSynced;
-    if ((sync && ::fsync(descriptor_) != 0) || ::close(std::exchange(descriptor_, -1)) != 0 ||
+    if (durability == Durability::kSynced) {
+      Sync();
+    }
+    if (::close(std::exchange(descriptor_, -1)) != 0 ||
         ::rename(temporary_.c_str(), target_.c_str()) != 0) {
       Fail();
     }
@@ -114,7 +123,7 @@ class TemporaryFile {
         target_.string(), Reason(error_number)));
   }
 
-  const fs::path& target_;
+  fs::path target_;
   fs::path temporary_;
   int descriptor_ = -1;
   bool renamed_ = false;
@@ -135,6 +144,13 @@ void AppendRest(std::ifstream& file, const fs::path& path, std::string& bytes) {
         fmt::format("{}: more than 256 MB come out of what is not a regular file; save them in one "
                     "and name that",
                     path.string()));
+  }
+}
+
+void RefuseFolder(const fs::path& path) {
+  std::error_code ignored;
+  if (fs::is_directory(path, ignored)) {
+    throw IoError(fmt::format("{}: is a folder, not a file", path.string()));
   }
 }
 
@@ -194,14 +210,51 @@ void WriteFileAtomically(const fs::path& path, std::string_view bytes, Durabilit
   }
 }
 
+void WriteFilesTogether(std::span<const FileBytes> files) {
+  std::list<TemporaryFile> written;
+  for (const FileBytes& file : files) {
+    RefuseFolder(file.path);
+    written.emplace_back(file.path).Write(file.bytes);
+    written.back().Sync();
+  }
+  for (TemporaryFile& file : written) {
+    file.Rename(Durability::kUnsynced);  // it was synced above
+  }
+  for (const FileBytes& file : files) {
+    SyncFolder(file.path.parent_path());
+  }
+}
+
+NewFolders::NewFolders(const fs::path& folder) {
+  std::error_code error;
+  for (fs::path at = folder; !at.empty() && !fs::exists(at, error) && !error;
+       at = at.parent_path()) {
+    made_.insert(made_.begin(), at);
+  }
+  fs::create_directories(folder, error);
+  if (error || !fs::is_directory(folder, error)) {
+    Remove();
+    throw IoError(fmt::format("{}: the folder cannot be created: {}; choose another one",
+                              folder.string(),
+                              error ? error.message() : std::string("a file of this name exists")));
+  }
+}
+
+NewFolders::~NewFolders() { Remove(); }
+
+void NewFolders::Remove() {
+  std::error_code ignored;
+  for (auto folder = made_.rbegin(); folder != made_.rend(); ++folder) {
+    fs::remove(*folder, ignored);  // fails, as it should, for a folder that is not empty
+  }
+}
+
 std::string ReadFileBytes(const fs::path& path) {
   std::error_code error;
   if (!fs::exists(path, error) && !error) {
     throw IoError(fmt::format("{}: no such file", path.string()));
   }
-  if (fs::is_directory(path, error)) {
-    throw IoError(fmt::format("{}: is a folder, not a file", path.string()));
-  }
+  RefuseFolder(path);
   try {
     return ReadBytes(path);
   } catch (const std::bad_alloc&) {

@@ -4,8 +4,10 @@
 #pragma once
 
 #include <filesystem>
+#include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "surfaces/base/layers.h"
 
@@ -24,6 +26,33 @@ enum class Durability { kSynced, kUnsynced };
 // temporary file remains.
 void WriteFileAtomically(const std::filesystem::path& path, std::string_view bytes,
                          Durability durability = Durability::kSynced);
+
+struct FileBytes {
+  std::filesystem::path path;
+  std::string bytes;
+};
+
+// Writes all files like WriteFileAtomically. If one of them cannot be written, for example on a
+// full disk, none changes.
+void WriteFilesTogether(std::span<const FileBytes> files);
+
+// Makes a folder with its parents. The destructor removes the folders that were made, as far as
+// they are empty, unless Keep was called: a command that refuses its input leaves nothing behind.
+class NewFolders {
+ public:
+  // Throws IoError.
+  explicit NewFolders(const std::filesystem::path& folder);
+  ~NewFolders();
+  NewFolders(const NewFolders&) = delete;
+  NewFolders& operator=(const NewFolders&) = delete;
+
+  void Keep() { made_.clear(); }
+
+ private:
+  void Remove();
+
+  std::vector<std::filesystem::path> made_;  // outermost first
+};
 
 // Reads the whole file. Throws IoError with the path and the reason: no such file, a folder, or the
 // system's reason.

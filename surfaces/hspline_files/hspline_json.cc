@@ -194,14 +194,10 @@ Feature FeatureFromJson(std::string_view text, const std::string& source) {
 
 std::filesystem::path StoreFeature(const std::filesystem::path& folder, const Feature& feature) {
   CheckFeatureName(feature.name);
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) {
-    throw IoError(
-        fmt::format("{}: the folder cannot be created: {}", folder.string(), error.message()));
-  }
   const std::filesystem::path path = folder / fmt::format("{}.json", feature.name);
+  NewFolders made(folder);
   WriteFileAtomically(path, FeatureToJson(feature));
+  made.Keep();
   return path;
 }
 

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <map>
+#include <string>
 
 #include "surfaces/hspline/feature.h"
 #include "surfaces/hspline/hspline_surface.h"
@@ -36,12 +38,25 @@ class FaceCommands : public ::testing::Test {
     EXPECT_EQ(outcome.err, "") << arguments;
   }
 
-  // Expects one line of error and exit code 2.
+  // Expects one line of error, exit code 2, and no new or changed file or folder.
   void ExpectRefused(const std::string& arguments, const std::string& words) {
+    const std::map<fs::path, std::string> before = Contents();
     const testing::Outcome outcome = Call(arguments);
     EXPECT_EQ(outcome.code, 2) << arguments;
     EXPECT_THAT(outcome.err, HasSubstr(words));
     EXPECT_EQ(std::count(outcome.err.begin(), outcome.err.end(), '\n'), 1) << outcome.err;
+    EXPECT_EQ(Contents(), before) << arguments;
+  }
+
+  // Everything in the folder, except the output of the last call.
+  std::map<fs::path, std::string> Contents() const {
+    std::map<fs::path, std::string> contents;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_.Path())) {
+      contents[entry.path()] = entry.is_regular_file() ? ReadFileBytes(entry.path()) : "";
+    }
+    contents.erase(folder_ / "stdout.txt");
+    contents.erase(folder_ / "stderr.txt");
+    return contents;
   }
 
   std::string Bytes(const std::string& name) { return ReadFileBytes(folder_ / name); }
@@ -64,6 +79,12 @@ TEST_F(FaceCommands, EditMovesVerticesAndItsInverseMovesThemBack) {
   ExpectRefused("edit face.json script.yaml --out back.json", "--force");
   ExpectRefused("edit face.json script.yaml --out x.json --inverse inverse.yaml", "--force");
   EXPECT_FALSE(fs::exists(folder_ / "x.json"));
+  fs::create_directories(folder_ / "dir");
+  for (const char* other : {"no/such.yaml", "dir", "face.json/x.yaml"}) {
+    const std::string name(other);
+    ExpectRefused("edit face.json script.yaml --out x.json --force --inverse " + name, name);
+    ExpectRefused("edit face.json script.yaml --inverse x.yaml --force --out " + name, name);
+  }
   ExpectDone("edit face.json script.yaml --out back.json --inverse inverse.yaml --force");
 }
 
@@ -189,6 +210,13 @@ TEST_F(FaceCommands, FeatureRefusesWhatItCannotDo) {
   ExpectDone("feature extract face.json --name a --library lib");
   ExpectRefused("feature extract face.json --name a --library lib", "--force");
   ExpectRefused("feature extract face.json --name 'a b' --library lib", "'a b' is not a name");
+  ExpectRefused("feature extract face.json --name 'a b' --library new/lib", "'a b' is not a name");
+  ExpectRefused("feature extract face.json --u 0.501 0.502 --name e --library new", "has detail");
+  ExpectRefused(fmt::format("feature extract face.json --name {} --library new/lib",
+                            std::string(300, 'n')),
+                "too long");
+  ExpectRefused("feature extract face.json --name e --library face.json/lib",
+                "the folder cannot be created");
   ExpectRefused("feature extract face.json --u 0.501 0.502 --name e --library lib", "has detail");
   ExpectRefused("feature apply face.json lib/c.json --out x.json", "c.json");
   ExpectRefused("feature blend lib/a.json --weights 1 2 --name c --library lib", "2 weights");
