@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -17,12 +18,17 @@ namespace semblance::interp {
 // A network given by site names, as published or as in a file. It is valid for every subject.
 struct NetworkPlan {
   std::string title;
+  std::optional<int> area_count;                  // as the file states it
   std::vector<std::array<std::string, 3>> areas;  // sites, e.g. {"sg", "g", "mso_l"}
 };
 template <class Visitor>
 void Fields(Visitor& visit, NetworkPlan& plan) {
   visit(FieldInfo{.name = "title", .doc = "what the network is and where it comes from"},
         plan.title);
+  visit(FieldInfo{.name = "area_count",
+                  .min = 1,
+                  .doc = "the number of areas; a file that was cut short has fewer and is refused"},
+        plan.area_count);
   visit(FieldInfo{.name = "areas",
                   .min = 1,
                   .doc = "the three sites of each area, counter-clockwise seen from outside"},

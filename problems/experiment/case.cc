@@ -323,6 +323,8 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQ
   GiveDepths(data, experiment, query, subject);
   InsertDowels(experiment, data, query, subject);
   const NetworkPlan plan = ReadNetworkPlan(experiment.network);
+  Append(subject.notes,
+         CheckNetworkSites(plan, experiment.network, data.landmarks.landmarks, experiment.sites));
   LayNetwork(PlanFor(experiment, data.landmarks, plan), subject);
   LayScoredNetwork(plan, subject);
   AppendInputs(experiment, subject);

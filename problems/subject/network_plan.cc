@@ -11,6 +11,8 @@
 #include <vector>
 
 #include "problems/config/config.h"
+#include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
 
 namespace semblance::problems {
 namespace {
@@ -128,7 +130,113 @@ class SiteRemover {
   const Points& points_;
 };
 
+Area Sorted(Area area) {
+  std::ranges::sort(area);
+  return area;
+}
+
+void CheckAreas(const NetworkPlan& plan, const std::string& file) {
+  std::set<Area> known;
+  for (const Area& area : plan.areas) {
+    const Area sorted = Sorted(area);
+    if (std::ranges::adjacent_find(sorted) != sorted.end()) {
+      throw InputError(
+          fmt::format("{}: area [{}] names a site twice; an area needs three "
+                      "different sites",
+                      file, fmt::join(area, ", ")));
+    }
+    if (!known.insert(sorted).second) {
+      throw InputError(
+          fmt::format("{}: area [{}] appears twice; keep one", file, fmt::join(area, ", ")));
+    }
+  }
+}
+
+// An edge has one area at the border and two inside, which run along it in opposite directions.
+void CheckEdges(const NetworkPlan& plan, const std::string& file) {
+  std::map<std::array<std::string, 2>, Area> area_at;  // by the edge in its direction
+  std::map<std::set<std::string>, int> areas;
+  for (const Area& area : plan.areas) {
+    for (int c = 0; c < 3; ++c) {
+      const std::array<std::string, 2> edge = {area[c], area[(c + 1) % 3]};
+      if (++areas[{edge[0], edge[1]}] > 2) {
+        throw InputError(fmt::format("{}: more than two areas have the edge {} {}; leave one out",
+                                     file, edge[0], edge[1]));
+      }
+      const auto [other, is_new] = area_at.emplace(edge, area);
+      if (!is_new) {
+        throw InputError(fmt::format(
+            "{}: the areas [{}] and [{}] lie on the same side of the edge {} {}; write the sites "
+            "of each area counter-clockwise as seen from outside",
+            file, fmt::join(other->second, ", "), fmt::join(area, ", "), edge[0], edge[1]));
+      }
+    }
+  }
+}
+
+void RefuseUnknownSites(const std::set<std::string>& named, const std::string& file,
+                        const ExtraSites& further) {
+  for (const std::string& site : named) {
+    if (!IsSite(site) && !further.contains(site)) {
+      throw InputError(fmt::format("{}: areas: {}; a name of your own must stand under `sites` too",
+                                   file, SiteFault(site)));
+    }
+  }
+}
+
+void RefuseMissingSites(const std::set<std::string>& named, const std::string& file,
+                        std::span<const Landmark> landmarks) {
+  std::vector<std::string> missing;
+  for (const Landmark& landmark : landmarks) {
+    if (IsStandardSite(landmark.site) && !named.contains(landmark.site)) {
+      missing.push_back(landmark.site);
+    }
+  }
+  if (!missing.empty()) {
+    throw InputError(fmt::format(
+        "{}: no area names the landmarks {}: the file may have been cut short; add their areas, "
+        "or state area_count in the file if they are left out on purpose",
+        file, fmt::join(missing, ", ")));
+  }
+}
+
+Area MirrorImage(const Area& area) {
+  Area mirrored;
+  std::ranges::transform(area, mirrored.begin(), MirroredSite);
+  return Sorted(mirrored);
+}
+
 }  // namespace
+
+std::vector<std::string> CheckNetworkSites(const NetworkPlan& plan,
+                                           const std::filesystem::path& file,
+                                           std::span<const Landmark> landmarks,
+                                           const ExtraSites& further) {
+  std::set<std::string> named;
+  std::set<Area> areas;
+  for (const Area& area : plan.areas) {
+    named.insert(area.begin(), area.end());
+    areas.insert(Sorted(area));
+  }
+  RefuseUnknownSites(named, file.string(), further);
+  if (plan.area_count) {
+    return {};
+  }
+  RefuseMissingSites(named, file.string(), landmarks);
+  std::vector<std::string> alone;
+  for (const Area& area : plan.areas) {
+    if (!areas.contains(MirrorImage(area))) {
+      alone.push_back(fmt::format("[{}]", fmt::join(area, ", ")));
+    }
+  }
+  if (alone.empty() || 4 * alone.size() > plan.areas.size()) {
+    return {};
+  }
+  return {
+      fmt::format("{}: the areas {} have no mirror image among the others; the file may have "
+                  "been cut short",
+                  file.filename().string(), fmt::join(alone, " "))};
+}
 
 NetworkPlan ReadNetworkPlan(const std::filesystem::path& path) {
   NetworkPlan plan = ReadConfig<NetworkPlan>(path);
@@ -136,20 +244,14 @@ NetworkPlan ReadNetworkPlan(const std::filesystem::path& path) {
     throw InputError(fmt::format("{}: areas: the list is empty; list the three sites of each area",
                                  path.string()));
   }
-  std::set<std::array<std::string, 3>> known;
-  for (const auto& area : plan.areas) {
-    auto sorted = area;
-    std::sort(sorted.begin(), sorted.end());
-    if (std::adjacent_find(sorted.begin(), sorted.end()) != sorted.end()) {
-      throw InputError(fmt::format(
-          "{}: area [{}, {}, {}] names a site twice; an area needs three different sites",
-          path.string(), area[0], area[1], area[2]));
-    }
-    if (!known.insert(sorted).second) {
-      throw InputError(fmt::format("{}: area [{}, {}, {}] appears twice; keep one", path.string(),
-                                   area[0], area[1], area[2]));
-    }
+  if (plan.area_count && *plan.area_count != static_cast<int>(plan.areas.size())) {
+    throw InputError(fmt::format(
+        "{}: area_count is {}, and the file has {} areas: it was cut short, or area_count is "
+        "wrong; copy the file again, or correct area_count",
+        path.string(), *plan.area_count, plan.areas.size()));
   }
+  CheckAreas(plan, path.string());
+  CheckEdges(plan, path.string());
   return plan;
 }
 

@@ -5,9 +5,13 @@
 #include <filesystem>
 #include <map>
 #include <set>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "interp/dowels/dowel_network.h"
+#include "problems/subject/extra_sites.h"
+#include "problems/subject/landmarks.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/base/geometry.h"
 
@@ -15,8 +19,18 @@ namespace semblance::problems {
 
 // Reads a plan: a title and the areas by their three sites, which need not be standard sites.
 // Throws IoError if the file cannot be read, ConfigError if it is not such a file, and InputError
-// if it has no area, an area names a site twice, or an area appears twice.
+// if it has no area or another number of areas than it states, an area names a site twice or
+// appears twice, an edge has more than two areas, or the two areas of an edge turn differently.
 NetworkPlan ReadNetworkPlan(const std::filesystem::path& path);
+
+// Compares the plan of `file` with the subject's sites. Throws InputError if an area names a site
+// that is neither in sites.h nor in `further`, or if no area names a standard site that has a
+// landmark: then the file may have been cut short. A plan that states its number of areas may leave
+// out sites. Returns a note if nearly all areas have a mirror image in the plan and some lack it.
+std::vector<std::string> CheckNetworkSites(const NetworkPlan& plan,
+                                           const std::filesystem::path& file,
+                                           std::span<const Landmark> landmarks,
+                                           const ExtraSites& further);
 
 // Removes the sites `gone` from the plan, so that fewer and larger areas cover the same skull. Each
 // site moves into a neighbour, and the areas between the two vanish (an edge collapse; Hoppe 1996).

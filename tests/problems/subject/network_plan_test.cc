@@ -8,8 +8,10 @@
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "problems/subject/sites.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "tests/testing/scratch_file.h"
@@ -136,6 +138,74 @@ TEST(NetworkPlan, RefusesWhatIsNotANetwork) {
   EXPECT_THROW(ReadNetworkPlan(ScratchFile("areas: [[g, sg]]\n")), ConfigError);
   EXPECT_THROW(ReadNetworkPlan(ScratchFile("area: [[g, sg, pg]]\n")), ConfigError);
   EXPECT_THROW(ReadNetworkPlan("/no/such/network.yaml"), IoError);
+  EXPECT_THAT(words("areas: [[g, sg, pg], [sg, g, id], [g, sg, me]]\n"),
+              HasSubstr("more than two areas have the edge g sg"));
+  EXPECT_THAT(words("areas: [[g, sg, pg], [g, sg, id]]\n"),
+              HasSubstr("the areas [g, sg, pg] and [g, sg, id] lie on the same side of the edge g "
+                        "sg"));
+  EXPECT_THAT(words("area_count: 2\nareas: [[g, sg, pg]]\n"),
+              HasSubstr("area_count is 2, and the file has 1 areas: it was cut short"));
+}
+
+std::vector<Landmark> LandmarksAt(const std::vector<std::string>& sites) {
+  std::vector<Landmark> landmarks;
+  for (const std::string& site : sites) {
+    landmarks.emplace_back().site = site;
+  }
+  return landmarks;
+}
+
+// The standard network after the first `bytes` bytes of its file, and whether it may be used.
+bool IsAcceptedAfterCut(const std::string& text, std::size_t bytes) {
+  try {
+    const NetworkPlan plan = ReadNetworkPlan(ScratchFile(text.substr(0, bytes)));
+    return CheckNetworkSites(plan, "n.yaml", LandmarksAt(StandardSiteCodes()), {}).empty();
+  } catch (const Error&) {
+    return false;
+  }
+}
+
+TEST(NetworkPlan, TheStandardNetworkIsRefusedWhereverItIsCut) {
+  const std::string text = ReadFileBytes(SEMBLANCE_SOURCE_DIR "/configs/networks/standard32.yaml");
+  EXPECT_TRUE(IsAcceptedAfterCut(text, text.size()));
+  const std::size_t end = text.rfind(']');
+  for (std::size_t bytes = 0; bytes <= end; bytes += 7) {
+    EXPECT_FALSE(IsAcceptedAfterCut(text, bytes)) << bytes;
+  }
+  for (std::size_t line = text.find('\n'); line < end; line = text.find('\n', line + 1)) {
+    EXPECT_FALSE(IsAcceptedAfterCut(text, line + 1)) << line;
+  }
+}
+
+// The same without the number of areas, as in a file of a user: only by its sites and symmetry.
+TEST(NetworkPlan, ANetworkThatIsCutAtALineIsRefusedOrNotedWithoutItsNumberOfAreas) {
+  NetworkPlan plan = Standard();
+  plan.area_count.reset();
+  const std::vector<Landmark> landmarks = LandmarksAt(StandardSiteCodes());
+  EXPECT_THAT(CheckNetworkSites(plan, "n.yaml", landmarks, {}), ::testing::IsEmpty());
+  plan.areas.pop_back();
+  EXPECT_THAT(CheckNetworkSites(plan, "n.yaml", landmarks, {}),
+              ::testing::ElementsAre(HasSubstr("[fe_r, sgl_r, zy_r] have no mirror image")));
+  for (std::size_t left = plan.areas.size() - 1; left > 0; --left) {
+    plan.areas.resize(left);
+    try {
+      EXPECT_EQ(CheckNetworkSites(plan, "n.yaml", landmarks, {}).size(), 1u) << left;
+    } catch (const InputError& error) {
+      EXPECT_THAT(error.what(), HasSubstr("n.yaml: no area names the landmarks")) << left;
+    }
+  }
+  plan.area_count = 1;  // left out on purpose
+  EXPECT_THAT(CheckNetworkSites(plan, "n.yaml", landmarks, {}), ::testing::IsEmpty());
+}
+
+TEST(NetworkPlan, AnUnknownSiteIsRefusedUnlessTheExperimentNamesIt) {
+  NetworkPlan plan = Standard();
+  std::ranges::replace(plan.areas.front(), std::string("sg"), std::string("sgg"));
+  EXPECT_THAT(WordsOf<InputError>([&] { CheckNetworkSites(plan, "n.yaml", {}, {}); }),
+              ::testing::AllOf(HasSubstr("n.yaml: areas: 'sgg'"), HasSubstr("did you mean 'sg'")));
+  EXPECT_THAT(CheckNetworkSites(plan, "n.yaml", {}, {{"sgg", {}}}), ::testing::IsEmpty());
+  std::ranges::replace(plan.areas.front(), std::string("sgg"), std::string("mmb_l"));
+  EXPECT_THAT(CheckNetworkSites(plan, "n.yaml", {}, {}), ::testing::IsEmpty());
 }
 
 struct Net {
