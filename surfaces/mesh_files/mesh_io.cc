@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <bit>
+#include <cctype>
 #include <cstring>
 #include <set>
+#include <utility>
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"
@@ -38,6 +41,80 @@ TriMesh Decode(std::string_view bytes, const std::string& extension, const std::
          : extension == ".obj" ? ReadObj(bytes, name)
          : extension == ".off" ? ReadOff(bytes, name)
                                : ReadStl(bytes, name);
+}
+
+// The part of a file that can state axes: the header of a PLY, the words of an STL, and the lines
+// of an OBJ or OFF before the first vertex.
+std::string_view HeaderOf(std::string_view bytes, const std::string& extension) {
+  if (extension == ".ply") {
+    return bytes.substr(0, bytes.find("end_header"));
+  }
+  if (extension == ".stl") {
+    constexpr std::size_t kWords = 80, kLongestName = 1000;
+    const std::size_t end = bytes.substr(0, kLongestName).find_first_of("\r\n");
+    const bool may_be_text = bytes.starts_with("solid") && end != bytes.npos;
+    return bytes.substr(0, may_be_text ? std::max(end, kWords) : kWords);
+  }
+  std::size_t at = 0;
+  while (at < bytes.size() && std::string_view("vf+-.0123456789").find(bytes[at]) == bytes.npos) {
+    at = std::min(bytes.find_first_of("\r\n", at), bytes.size() - 1) + 1;
+  }
+  return bytes.substr(0, at);
+}
+
+// The value after "SPACE=", in capitals; empty if there is none at or after `at`, which moves on.
+std::string NextSpace(std::string_view header, std::size_t& at) {
+  constexpr std::string_view kKey = "SPACE=";
+  const auto is_letter = [](char c) {
+    return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '-' || c == '_';
+  };
+  for (at = header.find(kKey, at); at != header.npos; at = header.find(kKey, at)) {
+    const bool is_word = at == 0 || !is_letter(header[at - 1]);
+    at += kKey.size();
+    std::string value;
+    for (std::size_t k = at; is_word && k < header.size() && is_letter(header[k]); ++k) {
+      value += static_cast<char>(std::toupper(static_cast<unsigned char>(header[k])));
+    }
+    if (!value.empty()) {
+      return value;
+    }
+  }
+  return "";
+}
+
+// True for other axes of anatomy, such as LAS or superior-anterior-right.
+bool IsAnatomical(const std::string& value) {
+  std::string letters;
+  for (std::size_t at = 0; at < value.size(); at = value.find('-', at)) {
+    at += value[at] == '-' ? 1 : 0;
+    letters += value.substr(at, 1);
+  }
+  letters = value.size() == 3 ? value : letters;
+  return letters.size() == 3 &&
+         std::ranges::all_of(std::array{"LR", "AP", "IS"}, [&](std::string_view pair) {
+           return letters.find_first_of(pair) != letters.npos;
+         });
+}
+
+MeshAxes FindStatedAxes(std::string_view header, const std::string& name) {
+  MeshAxes axes = MeshAxes::kUnstated;
+  std::size_t at = 0;
+  for (std::string value = NextSpace(header, at); !value.empty(); value = NextSpace(header, at)) {
+    const bool lps = value == "LPS" || value == "LEFT-POSTERIOR-SUPERIOR",
+               ras = value == "RAS" || value == "RIGHT-ANTERIOR-SUPERIOR";
+    if (!lps && !ras && IsAnatomical(value)) {
+      throw InputError(fmt::format(
+          "{}: the file states SPACE={}; only LPS and RAS are read: save it again in one of these",
+          name, Shown(value)));
+    }
+    const MeshAxes found = lps ? MeshAxes::kLps : ras ? MeshAxes::kRas : MeshAxes::kUnstated;
+    if (found != MeshAxes::kUnstated && axes != MeshAxes::kUnstated && axes != found) {
+      throw InputError(fmt::format(
+          "{}: the file states SPACE=LPS and SPACE=RAS; take the wrong line out", name));
+    }
+    axes = found == MeshAxes::kUnstated ? axes : found;
+  }
+  return axes;
 }
 
 enum class Precision { kSingle, kDouble };
@@ -173,7 +250,7 @@ void CheckAttributes(std::size_t vertices, const MeshAttributes& attributes) {
   }
 }
 
-TriMesh ReadMesh(const std::filesystem::path& path) {
+MeshFile ReadMeshFile(const std::filesystem::path& path) {
   const std::string name = path.string(), extension = LowerExtension(path);
   CheckExtension(extension, name);
   const std::string bytes = ReadFileBytes(path);
@@ -188,7 +265,33 @@ TriMesh ReadMesh(const std::filesystem::path& path) {
     throw InputError(fmt::format("{}: the mesh has {} triangles; at most {} are allowed", name,
                                  mesh.triangles.size(), kMaxElements));
   }
-  return mesh;
+  return {std::move(mesh), FindStatedAxes(HeaderOf(bytes, extension), name)};
+}
+
+MeshAxes ReadStatedAxes(const std::filesystem::path& path) {
+  return FindStatedAxes(HeaderOf(ReadFileBytes(path), LowerExtension(path)), path.string());
+}
+
+TriMesh ReadMeshInLps(const std::filesystem::path& path, std::vector<std::string>& notes) {
+  MeshFile file = ReadMeshFile(path);
+  if (file.axes == MeshAxes::kRas) {
+    for (Vec3& p : file.mesh.points) {
+      p = Vec3(-p.x(), -p.y(), p.z());
+    }
+    notes.push_back(fmt::format("{}: the file states SPACE=RAS; turned to LPS (x and y negated)",
+                                path.filename().string()));
+  }
+  return std::move(file.mesh);
+}
+
+TriMesh ReadMesh(const std::filesystem::path& path) {
+  MeshFile file = ReadMeshFile(path);
+  if (file.axes == MeshAxes::kRas) {
+    throw InputError(fmt::format(
+        "{}: the file states SPACE=RAS, and this mesh must be in LPS; save it again in LPS",
+        path.string()));
+  }
+  return std::move(file.mesh);
 }
 
 std::string EncodeMesh(const TriMesh& mesh, const std::string& extension,

@@ -5,11 +5,22 @@
 #include <filesystem>
 #include <limits>
 #include <string>
+#include <vector>
 
 #include "surfaces/mesh/tri_mesh.h"
 #include "surfaces/mesh_files/mesh_attributes.h"
 
 namespace semblance::surfaces {
+
+// The axes that a file states, as 3D Slicer does by SPACE=LPS or SPACE=RAS in a comment of the
+// header or in the words of an STL. LPS: +x subject left, +y posterior, +z up. RAS is LPS with x
+// and y negated.
+enum class MeshAxes { kUnstated, kLps, kRas };
+
+struct MeshFile {
+  TriMesh mesh;  // as written
+  MeshAxes axes = MeshAxes::kUnstated;
+};
 
 // Reads a mesh; the format follows the extension (.ply .obj .stl .off). All faces are kept as they
 // are, also where edges are non-manifold. Polygons become triangles, and equal corners of an STL
@@ -17,7 +28,17 @@ namespace semblance::surfaces {
 // are single precision, except doubles and whole numbers in a PLY, and texts beyond 1024 mm
 // (text_lines.h). No fault is skipped: throws IoError (no such file, unknown extension, empty) or
 // InputError (no triangles, or anything that does not belong to the format), with the file and the
-// line or byte. Memory follows the size of the file, not the counts in its header.
+// line or byte; an InputError also for SPACE= with other axes, and for two that differ. Memory
+// follows the size of the file, not the counts in its header.
+MeshFile ReadMeshFile(const std::filesystem::path& path);
+
+// The axes that the header of a mesh file states. Throws IoError if it cannot be read.
+MeshAxes ReadStatedAxes(const std::filesystem::path& path);
+
+// Reads a mesh and turns it to LPS if the file states RAS, which adds a line to `notes`.
+TriMesh ReadMeshInLps(const std::filesystem::path& path, std::vector<std::string>& notes);
+
+// Reads a mesh for which nobody reads notes, and refuses one whose file states RAS.
 TriMesh ReadMesh(const std::filesystem::path& path);
 
 // Returns the bytes of a mesh file. extension: ".ply" (binary little-endian, with all attributes),

@@ -28,7 +28,9 @@ class ObjReader {
  public:
   enum class Keep { kShape, kLooks };
   ObjReader(std::string_view bytes, const std::string& name, Keep keep)
-      : lines_(bytes, name, {.comment = '#'}), keeps_looks_(keep == Keep::kLooks) {}
+      : lines_(bytes, name, {.comment = '#', .goes_on_after_backslash = true}),
+        name_(name),
+        keeps_looks_(keep == Keep::kLooks) {}
 
   ObjFile Read() {
     while (lines_.NextLine()) {
@@ -47,6 +49,7 @@ class ObjReader {
       }
     }
     CheckHighest();
+    fans_.Finish(mesh_, name_);
     if (obj_.colours.size() != mesh_.points.size()) {
       obj_.colours.clear();
     }
@@ -114,7 +117,7 @@ class ObjReader {
       obj_.polygons.push_back(std::move(polygon));
     }
     RemoveRepeats();
-    AppendFan(corners_, mesh_.triangles);
+    fans_.Append(corners_, mesh_.triangles);
   }
 
   // Removes the corners that repeat an earlier one.
@@ -202,7 +205,9 @@ class ObjReader {
   }
 
   TextLines lines_;
+  const std::string& name_;
   bool keeps_looks_;
+  PolygonFans fans_;
   ObjFile obj_;
   TriMesh& mesh_ = obj_.mesh;
   std::string material_;

@@ -11,7 +11,8 @@
 
 namespace semblance::surfaces {
 
-// Reads the vertices (TextLines::NextPoint) and polygons of an OBJ; polygons become triangles.
+// Reads the vertices (TextLines::NextPoint) and polygons of an OBJ; polygons become triangles, also
+// concave ones (PolygonFans). A line may go on in the next one after a backslash.
 // Indices may be relative (-1 is the last vertex so far). A corner that repeats an earlier one of
 // its face is dropped, and so is a face without area. Texture, normals, groups, materials, lines
 // and points are skipped. name: the file, for messages. Throws InputError with the line for

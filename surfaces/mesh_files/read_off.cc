@@ -15,7 +15,7 @@ namespace {
 class OffReader {
  public:
   OffReader(std::string_view bytes, const std::string& name)
-      : lines_(bytes, name, {.comment = '#'}) {}
+      : lines_(bytes, name, {.comment = '#'}), name_(name) {}
 
   TriMesh Read() {
     ReadKeyword();
@@ -26,6 +26,7 @@ class OffReader {
       lines_.Fail(fmt::format("more lines than the header says: it says {} vertices and {} faces",
                               vertices_, faces_));
     }
+    fans_.Finish(mesh_, name_);
     return std::move(mesh_);
   }
 
@@ -109,7 +110,7 @@ class OffReader {
         corners.push_back(
             static_cast<std::int32_t>(lines_.NextInteger("index of a vertex", 0, vertices_ - 1)));
       }
-      AppendFan(corners, mesh_.triangles);
+      fans_.Append(corners, mesh_.triangles);
       SkipColour();
     }
   }
@@ -130,7 +131,9 @@ class OffReader {
   }
 
   TextLines lines_;
+  const std::string& name_;
   TriMesh mesh_;
+  PolygonFans fans_;
   std::int64_t vertices_ = 0, faces_ = 0;
   int fewest_extras_ = 0, most_extras_ = 0;  // numbers of a vertex beside its position
 };

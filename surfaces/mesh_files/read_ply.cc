@@ -408,51 +408,94 @@ std::vector<Vec3> ReadPoints(Data& data, const PlyElement& vertex, const std::st
 }
 
 template <class Data>
-std::vector<Triangle> ReadFaces(Data& data, const PlyElement& face, std::int64_t points,
-                                const std::string& name) {
+std::int32_t CornerIndex(const Data& data, const char* what, std::int64_t row, double value,
+                         std::int64_t points) {
+  if (!IsIndex(value, static_cast<double>(points))) {
+    data.Fail(fmt::format("{} {} names vertex {}; there are {}, numbered from 0", what, row, value,
+                          points));
+  }
+  return static_cast<std::int32_t>(value);
+}
+
+template <class Data>
+void ReadFaces(Data& data, const PlyElement& face, std::int64_t points, const std::string& name,
+               std::vector<Triangle>& triangles, PolygonFans& fans) {
   const std::size_t list = FindCorners(face, name);
-  std::vector<Triangle> triangles;
-  triangles.reserve(static_cast<std::size_t>(face.count));
+  triangles.reserve(triangles.size() + static_cast<std::size_t>(face.count));
   std::vector<std::int32_t> corners;
   ForEachValue(
       data, face,
       [&](std::int64_t row, std::size_t k, double value) {
-        if (k != list) {
-          return;
+        if (k == list) {
+          corners.push_back(CornerIndex(data, "face", row, value, points));
         }
-        if (!IsIndex(value, static_cast<double>(points))) {
-          data.Fail(fmt::format("face {} names vertex {}; there are {}, numbered from 0", row,
-                                value, points));
-        }
-        corners.push_back(static_cast<std::int32_t>(value));
       },
       [&](std::int64_t row) {
         if (corners.size() < 3) {
           data.Fail(
               fmt::format("face {} has {} corners; it needs at least 3", row, corners.size()));
         }
-        AppendFan(corners, triangles);
+        fans.Append(corners, triangles);
         corners.clear();
       });
-  return triangles;
+}
+
+// Appends the triangles of one strip. Two equal corners, with which programs join strips, make no
+// triangle.
+void AppendStrip(const std::vector<std::int32_t>& strip, std::vector<Triangle>& triangles) {
+  for (std::size_t k = 2; k < strip.size(); ++k) {
+    const bool turned = k % 2 == 1;
+    const Triangle t = {strip[turned ? k - 1 : k - 2], strip[turned ? k - 2 : k - 1], strip[k]};
+    if (t[0] != t[1] && t[1] != t[2] && t[2] != t[0]) {
+      triangles.push_back(t);
+    }
+  }
+}
+
+template <class Data>
+void ReadStrips(Data& data, const PlyElement& strips, std::int64_t points, const std::string& name,
+                std::vector<Triangle>& triangles) {
+  constexpr double kEnd = -1;
+  const std::size_t list = FindCorners(strips, name);
+  std::vector<std::int32_t> strip;
+  const auto end_strip = [&](std::int64_t) {
+    AppendStrip(strip, triangles);
+    strip.clear();
+  };
+  ForEachValue(
+      data, strips,
+      [&](std::int64_t row, std::size_t k, double value) {
+        if (k == list && value == kEnd) {
+          end_strip(row);
+        } else if (k == list) {
+          strip.push_back(CornerIndex(data, "strip", row, value, points));
+        }
+      },
+      end_strip);
 }
 
 template <class Data>
 TriMesh ReadMeshData(Data data, PlyHeader& header, const std::string& name) {
   const PlyElement& vertex = FindElement(header, "vertex", name);
-  const PlyElement& face = FindElement(header, "face", name);
+  if (std::ranges::find(header.elements, "tristrips", &PlyElement::name) == header.elements.end()) {
+    FindElement(header, "face", name);  // a mesh has faces or strips
+  }
   TriMesh mesh;
+  PolygonFans fans;
   for (const PlyElement& element : header.elements) {
     if (&element == &vertex) {
       mesh.points = ReadPoints(data, vertex, name);
-    } else if (&element == &face) {
-      mesh.triangles = ReadFaces(data, face, vertex.count, name);
+    } else if (element.name == "face") {
+      ReadFaces(data, element, vertex.count, name, mesh.triangles, fans);
+    } else if (element.name == "tristrips") {
+      ReadStrips(data, element, vertex.count, name, mesh.triangles);
     } else {
       ForEachValue(
           data, element, [](auto...) {}, [](auto...) {});
     }
   }
   data.End();
+  fans.Finish(mesh, name);
   return mesh;
 }
 

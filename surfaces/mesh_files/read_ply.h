@@ -14,7 +14,9 @@
 namespace semblance::surfaces {
 
 // Reads the positions x, y, z of element 'vertex' and the polygons vertex_indices (or vertex_index)
-// of element 'face', which become triangles. Coordinates of type double and of whole types keep all
+// of element 'face', which become triangles, also concave ones (PolygonFans). Element 'tristrips'
+// has the same list: each corner from the third on makes a triangle with the two before it, in
+// alternating order, and -1 ends a strip. Coordinates of type double and of whole types keep all
 // their digits. Other properties and elements are skipped. name: the file, for messages.
 // Throws InputError with the line (text) or byte (binary) for anything else: data shorter or longer
 // than the header says, fewer than 3 corners, an index out of range, a coordinate that is not

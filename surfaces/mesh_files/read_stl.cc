@@ -182,7 +182,8 @@ bool IsText(std::string_view bytes) {
     return false;
   }
   constexpr std::string_view kFirst = "solid";
-  const std::size_t begin = bytes.find_first_not_of(" \t\r\n");
+  const std::size_t begin =
+      bytes.find_first_not_of(" \t\r\n\xEF\xBB\xBF");  // with a byte order mark
   return begin != std::string_view::npos && Is(bytes.substr(begin, kFirst.size()), kFirst) &&
          bytes.substr(0, kHeader).find('\0') == std::string_view::npos;
 }

@@ -28,6 +28,25 @@ double SingleStep(double coordinate);
 // Appends a polygon as triangles that share its first corner; none if it has fewer than 3 corners.
 void AppendFan(std::span<const std::int32_t> corners, std::vector<Triangle>& triangles);
 
+// Makes triangles of the polygons of a file. A fan is right for a convex polygon only, and a file
+// may name vertices before it lists them, so concave polygons get other triangles at the end.
+class PolygonFans {
+ public:
+  // Appends a polygon as AppendFan does.
+  void Append(std::span<const std::int32_t> corners, std::vector<Triangle>& triangles);
+  // Replaces the fan of each concave polygon by as many triangles that lie inside it. The polygon
+  // is seen along its mean normal; its ears are cut off one by one. A polygon that crosses itself
+  // keeps a fan of what is left. Throws InputError, beginning with `name`, for a concave polygon of
+  // more than 1,000 corners, which would take too long.
+  void Finish(TriMesh& mesh, const std::string& name) const;
+
+ private:
+  struct Fan {
+    std::size_t first = 0, corners = 0;  // first triangle; at least 4 corners
+  };
+  std::vector<Fan> fans_;
+};
+
 // A piece of a file for a message: at most 40 characters, with '?' for those that cannot be
 // printed.
 std::string Shown(std::string_view piece);
@@ -35,19 +54,23 @@ std::string Shown(std::string_view piece);
 // True if the bytes are white space and zeros only, with which some programs pad a file.
 bool IsPadding(std::string_view bytes);
 
-// Reads a text line by line. Every fault is an InputError that names the file and the line.
+// Reads a text line by line. Lines end with a line feed, or all of them with a carriage return, as
+// on old Macs. A byte order mark at the beginning is skipped. Every fault is an InputError that
+// names the file and the line.
 class TextLines {
  public:
   struct Options {
     char comment = '\0';          // begins a comment, which ends with the line; 0: there are none
     std::int64_t first_line = 1;  // number of the text's first line in its file
+    // A line without a comment goes on in the next one if it ends with a backslash, as in an OBJ.
+    bool goes_on_after_backslash = false;
   };
   // Keeps a view of `text`. name: the file, for messages.
   TextLines(std::string_view text, std::string name, const Options& options);
 
   // Goes to the next line that has a word; false if there is none.
   bool NextLine();
-  std::int64_t LineNumber() const { return number_; }
+  std::int64_t LineNumber() const;  // in the file; of the place that was read last
 
   // These read the current line.
   bool AtLineEnd();
@@ -70,10 +93,13 @@ class TextLines {
   std::size_t BytesLeft() const { return text_.size() - next_; }
 
   // what: what is wrong; what is allowed or what to do.
-  [[noreturn]] void Fail(const std::string& what) const { FailAt(number_, what); }
+  [[noreturn]] void Fail(const std::string& what) const { FailAt(LineNumber(), what); }
   [[noreturn]] void FailAt(std::int64_t line, const std::string& what) const;
 
  private:
+  std::string_view TakeLine();
+  bool GoesOn() const;
+  void JoinNextLines();
   template <class T>
   T NextNumber();
   template <class T>
@@ -81,9 +107,12 @@ class TextLines {
 
   std::string_view text_, whole_line_, line_;  // line_ is whole_line_ without the comment
   std::string name_;
-  char comment_;
+  char comment_, line_end_ = '\n';
+  bool goes_on_;
   std::size_t next_ = 0, at_ = 0;
-  std::int64_t number_;
+  std::int64_t number_;              // of the last line taken from the text
+  std::string joined_;               // a line that goes on, with the lines after it
+  std::vector<std::size_t> joints_;  // beginnings of these lines in it
 };
 
 }  // namespace semblance::surfaces

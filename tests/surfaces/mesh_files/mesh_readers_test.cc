@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Laws that every reader of meshes obeys, and each fault with its words.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -265,6 +266,119 @@ TEST(MeshReaders, RelativeAndLaterVerticesOfAnObj) {
             (std::vector<Triangle>{{0, 1, 2}, {2, 1, 0}}));
   EXPECT_EQ(Read(".obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 1 2\nf 1 2 2 3 1\n").triangles,
             (std::vector<Triangle>{{0, 1, 2}}));
+}
+
+TEST(MeshReaders, ALineOfAnObjMayGoOnAfterABackslash) {
+  const TriMesh mesh = Read(".obj",
+                            "# a comment ends with its line \\\nv 0 0 \\\n  0\nv 1 \\\r\n 0 \\\n0\n"
+                            "v 0 1 0\nf 1 \\\n\\\n 2 3");
+  EXPECT_EQ(mesh.points, (std::vector<Vec3>{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}));
+  EXPECT_EQ(mesh.triangles, (std::vector<Triangle>{{0, 1, 2}}));
+  EXPECT_EQ(ErrorOf(".obj", "v 0 0 \\\n0\nv 1 \\\n0 \\\nx\n").substr(0, 14), "a.obj: line 5:");
+  EXPECT_EQ(ErrorOf(".obj", "v 0 0 \\\n0\nv 1 x \\\n0\n").substr(0, 14), "a.obj: line 3:");
+  EXPECT_EQ(ErrorOf(".obj", "v 0 0 0\nv \\\n1 0 0\nx 3\n").substr(0, 14), "a.obj: line 4:");
+}
+
+// Spreadsheets and editors write a byte order mark, old Macs end lines with a carriage return.
+TEST(MeshReaders, AByteOrderMarkAndTheEndsOfLinesDoNotMatter) {
+  for (const auto& [extension, bytes] : ValidFiles()) {
+    if (bytes.find('\0') != std::string::npos) {
+      continue;
+    }
+    const TriMesh plain = Read(extension, bytes);
+    std::string mac = bytes, windows;
+    std::ranges::replace(mac, '\n', '\r');
+    for (const char c : bytes) {
+      windows += c == '\n' ? "\r\n" : std::string(1, c);
+    }
+    for (const std::string& other : {mac, windows, "\xEF\xBB\xBF" + bytes}) {
+      EXPECT_EQ(Read(extension, other).points, plain.points) << extension;
+      EXPECT_EQ(Read(extension, other).triangles, plain.triangles) << extension;
+    }
+  }
+  EXPECT_THAT(ErrorOf(".obj", "v 0 0 0\rv 1 0 0\rv x 1 0\r"), HasSubstr("a.obj: line 3: 'x'"));
+}
+
+TEST(MeshReaders, TheStripsOfAPlyAreTriangles) {
+  const auto strips = [](const std::string& rows, const std::string& more = "") {
+    return "ply\nformat ascii 1.0\nelement vertex 5\nproperty float x\nproperty float y\nproperty "
+           "float z\nelement tristrips " +
+           std::string(1, rows[0]) + "\nproperty list int int vertex_indices\n" + more +
+           "end_header\n0 0 0\n1 0 0\n0 1 0\n1 1 0\n0 2 0\n" + rows.substr(1);
+  };
+  const std::vector<Triangle> expected = {{0, 1, 2}, {2, 1, 3}, {2, 3, 4}};
+  EXPECT_EQ(Read(".ply", strips("15 0 1 2 3 4\n")).triangles, expected);
+  EXPECT_EQ(Read(".ply", strips("18 0 1 2 3 4 -1 0 1\n")).triangles, expected) << "a strip of two";
+  EXPECT_EQ(Read(".ply", strips("19 0 1 2 3 -1 2 3 4 -1\n")).triangles, expected);
+  EXPECT_EQ(Read(".ply", strips("24 0 1 2 3\n3 2 3 4\n")).triangles, expected);
+  EXPECT_EQ(Read(".ply", strips("18 0 1 2 2 3 3 4 4\n")).triangles.size(), 1u)
+      << "equal corners make no triangle";
+  EXPECT_EQ(Read(".ply", strips("13 0 1 2\n3 1 3 2\n",
+                                "element face 1\nproperty list uchar int vertex_indices\n"))
+                .triangles,
+            (std::vector<Triangle>{{0, 1, 2}, {1, 3, 2}}));
+  EXPECT_THAT(ErrorOf(".ply", strips("13 0 1 5\n")),
+              HasSubstr("strip 0 names vertex 5; there are 5, numbered from 0"));
+  EXPECT_THAT(ErrorOf(".ply", strips("14 0 1 -2 3\n")), HasSubstr("strip 0 names vertex -2"));
+}
+
+// A polygon's area by the shoelace formula is an oracle: triangles that cover it once have the same
+// area, and a fan of a concave polygon has more.
+TEST(MeshReaders, PolygonsAreCoveredOnceAlsoIfTheyAreConcave) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> radius(0.2, 1), angle(0, 6.28);
+  for (int n = 4; n < 60; ++n) {
+    std::vector<Vec2> corners;  // star-shaped about the origin, seldom convex
+    for (int k = 0; k < n; ++k) {
+      const double phi = 2 * 3.14159265358979 * k / n, r = radius(random);
+      corners.emplace_back(r * std::cos(phi), r * std::sin(phi));
+    }
+    double expected = 0;
+    for (int k = 0; k < n; ++k) {
+      const Vec2 &a = corners[k], &b = corners[(k + 1) % n];
+      expected += (a.x() * b.y() - a.y() * b.x()) / 2;
+    }
+    const Eigen::AngleAxisd turn(angle(random), Vec3(1, 2, 3).normalized());
+    std::string points, face;
+    for (int k = 0; k < n; ++k) {
+      const Vec3 p = 100 * (turn * Vec3(corners[k].x(), corners[k].y(), 0));
+      points += fmt::format("v {} {} {}\n", p.x(), p.y(), p.z());
+      face += fmt::format(" {}", k + 1);
+    }
+    const TriMesh mesh = Read(".obj", "f" + face + "\n" + points);
+    ASSERT_EQ(mesh.triangles.size(), static_cast<std::size_t>(n - 2));
+    EXPECT_NEAR(Area(mesh), 1e4 * expected, 1e-2) << n;
+    const Vec3 normal = turn * Vec3::UnitZ();
+    EXPECT_TRUE(std::ranges::all_of(mesh.triangles, [&](const Triangle& t) {
+      return TriangleAreaVector(mesh, t).dot(normal) > -1e-3;
+    })) << "turned over";
+  }
+}
+
+TEST(MeshReaders, AConcaveQuadIsTheSameInEveryFormat) {
+  // An arrowhead whose concave corner is the third: the fan of the first corner is right, and that
+  // of the second covers the dent.
+  const std::string points = "0 0 0\n4 0 0\n1 1 0\n0 4 0\n";
+  const TriMesh off = Read(".off", "OFF\n4 1 0\n" + points + "4 1 2 3 0\n");
+  EXPECT_NEAR(Area(off), 4, 1e-12);
+  const TriMesh ply =
+      Read(".ply",
+           "ply\nformat ascii 1.0\nelement face 1\nproperty list uchar int vertex_index\n"
+           "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+           "end_header\n4 1 2 3 0\n" +
+               points);
+  EXPECT_EQ(ply.triangles, off.triangles);
+  EXPECT_NEAR(Area(Read(".off", "OFF\n4 1 0\n" + points + "4 0 1 2 3\n")), 4, 1e-12);
+}
+
+TEST(MeshReaders, AHugeConcavePolygonIsRefused) {
+  std::string points, face;
+  for (int k = 0; k < 1001; ++k) {
+    points += fmt::format("v {} {} 0\n", k, k % 2 == 0 ? 0 : 1);
+    face += fmt::format(" {}", k + 1);
+  }
+  EXPECT_THAT(ErrorOf(".obj", points + "v 500 900 0\nf" + face + " 1002\n"),
+              HasSubstr("a.obj: a face of 1002 corners that is not convex; triangulate the mesh"));
 }
 
 TEST(MeshReaders, VariantsOfOff) {
