@@ -63,19 +63,24 @@ std::string_view LineFrom(std::span<const std::string_view> lines, const YAML::M
   return text.substr(std::min<std::size_t>(std::max(mark.column, 0), text.size()));
 }
 
-// Returns true if the quote at the start of `line` is closed within the line.
-bool ClosesQuote(std::string_view line) {
-  const char quote = line.front();
-  for (std::size_t k = 1; k < line.size(); ++k) {
-    const bool escapes = quote == '"' && line[k] == '\\';  // the next character closes nothing
-    const bool is_doubled = quote == '\'' && line.substr(k).starts_with("''");
+// Returns true if `quote`, which is open at the start of `rest`, is closed in it.
+bool ClosesQuote(std::string_view rest, char quote) {
+  for (std::size_t k = 0; k < rest.size(); ++k) {
+    const bool escapes = quote == '"' && rest[k] == '\\';  // the next character closes nothing
+    const bool is_doubled = quote == '\'' && rest.substr(k).starts_with("''");
     if (escapes || is_doubled) {
       ++k;
-    } else if (line[k] == quote) {
+    } else if (rest[k] == quote) {
       return true;
     }
   }
   return false;
+}
+
+// The number of blanks before the first other character of a line; nothing for an empty line.
+std::optional<std::size_t> Indent(std::string_view line) {
+  const std::size_t first = line.find_first_not_of(" \r");
+  return first == line.npos ? std::nullopt : std::optional(first);
 }
 
 // Builds the tree of the first document. Adds an error for everything that a tree cannot represent.
@@ -171,21 +176,49 @@ class TreeBuilder : public YAML::EventHandler {
     }
   }
 
-  // Refuses a text that continues on the next line. Most such texts come from a quote or bracket
-  // that was not closed, and would swallow the options that follow.
+  // Refuses a text that continues on the next line and looks like a mistake: a quote or a bracket
+  // that was not closed would swallow the options that follow. Programs that fold long texts indent
+  // the next lines deeper than the line of the text's key, and fold no short lines.
   void RefuseSeveralLines(const YAML::Mark& mark, const std::string& value) {
+    constexpr std::size_t kFolded = 80;  // columns; PyYAML folds a text after them
     const std::string_view line = LineFrom(lines_, mark);
     const bool is_quoted = line.starts_with('"') || line.starts_with('\'');
     const bool is_flow = !levels_.empty() && levels_.back().is_flow;
-    if (is_quoted && !ClosesQuote(line)) {
+    if (is_quoted && !ClosesQuote(line.substr(1), line.front()) && !IsFoldedQuote(mark)) {
       AddError(mark,
                "the quote that begins here is not closed in its line; close it (write a text of "
-               "several lines as a block, after |)");
-    } else if (!is_quoted && is_flow && !line.starts_with(value)) {
+               "several lines as a block, after |, or indent its next lines deeper)");
+    } else if (!is_quoted && is_flow && !line.starts_with(value) &&
+               static_cast<std::size_t>(std::max(mark.column, 0)) + line.size() < kFolded) {
       AddError(mark,
                "a text within brackets continues on the next line; is a comma or a bracket "
                "missing?");
     }
+  }
+
+  // Returns true if the lines after `mark`, up to the one that closes its quote, are indented
+  // deeper than the line of `mark`. Empty lines are allowed between them.
+  bool IsFoldedQuote(const YAML::Mark& mark) const {
+    const auto first = static_cast<std::size_t>(std::max(mark.line, 0));
+    if (first >= lines_.size()) {
+      return false;
+    }
+    const char quote = LineFrom(lines_, mark).front();
+    // "- " before a key or a text is not part of its indent.
+    const std::string_view line = lines_[first];
+    const std::size_t indent = std::min(line.find_first_not_of(" -"), line.size());
+    const std::size_t least = LineFrom(lines_, mark).size() == line.size() - indent
+                                  ? Indent(line).value_or(0)  // an item of a list
+                                  : indent;
+    for (std::size_t k = first + 1; k < lines_.size(); ++k) {
+      if (const auto next = Indent(lines_[k]); next && *next <= least) {
+        return false;
+      }
+      if (ClosesQuote(lines_[k], quote)) {
+        return true;
+      }
+    }
+    return false;
   }
 
   void Open(const YAML::Mark& mark, const std::string& tag, ConfigNode::Kind kind,
@@ -239,14 +272,14 @@ class TreeBuilder : public YAML::EventHandler {
       throw YAML::Exception(mark, fmt::format("more than {} entries in one map", kMaxKeys));
     }
     level.is_key_good = node.IsScalar();
-    level.key = node.text;
+    level.key = Normalized(node.text);
     level.key_location = node.location;
     std::string what;
     if (!node.IsScalar()) {
       what = "a key must be a word";
     } else if (node.text == "<<" && !node.quoted) {
       what = "merge keys (<<) are not read; repeat the entries or use base:";
-    } else if (const ConfigLocation* first = FindKey(level.node, node.text)) {
+    } else if (const ConfigLocation* first = FindKey(level.node, level.key)) {
       what = fmt::format("the key appears twice; first at line {}, column {}", first->line,
                          first->column);
     }

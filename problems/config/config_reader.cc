@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "problems/config/spelling_suggestion.h"
+#include "problems/config/utf8_check.h"
 
 namespace semblance::problems {
 namespace {
@@ -146,9 +147,17 @@ void ReadInteger(ConfigErrors& errors, const ConfigItem& item, Integer& out) {
 }
 
 // Resolves a path. If a run's folder was moved to another machine, the absolute paths in its
-// resolved.yaml no longer exist; then a file of the same name in `folder` is taken.
+// resolved.yaml no longer exist; then a file of the same name in `folder` is taken. The bytes of a
+// name may differ from those on disk if both are the same text in Unicode.
 std::filesystem::path FoundPath(const std::filesystem::path& folder, const std::string& text) {
-  const std::filesystem::path named = std::filesystem::absolute(folder / text).lexically_normal();
+  std::filesystem::path named = std::filesystem::absolute(folder / text).lexically_normal();
+  for (const NormalForm form : {NormalForm::kComposed, NormalForm::kDecomposed}) {
+    const std::filesystem::path same = Normalized(named.string(), form);
+    std::error_code error;
+    if (!std::filesystem::exists(named, error) && std::filesystem::exists(same, error)) {
+      named = same;
+    }
+  }
   const std::filesystem::path beside =
       std::filesystem::absolute(folder / named.filename()).lexically_normal();
   std::error_code ignored;
@@ -209,7 +218,7 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, AutoOr<double>& ou
 
 void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::string& out) {
   if (RequireScalar(errors, item, "a text")) {
-    out = item.node.text;
+    out = Normalized(item.node.text);
   }
 }
 
@@ -220,6 +229,8 @@ void ReadScalar(ConfigErrors& errors, const ConfigItem& item, std::filesystem::p
   const std::string& text = item.node.text;
   if (text.starts_with('~')) {
     AddError(errors, item, fmt::format("'{}': ~ is not expanded; write the whole path", text));
+  } else if (text.find('\0') != text.npos) {
+    AddError(errors, item, "a path cannot have the character NUL (\\0); leave it out");
   } else if (text.empty()) {
     out.clear();
   } else {

@@ -10,6 +10,7 @@
 #include <optional>
 #include <tuple>
 
+#include "problems/config/utf8_check.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
@@ -187,15 +188,15 @@ bool IsPlainText(std::string_view text) {
 
 std::string QuotedText(std::string_view text) {
   std::string out = "\"";
-  for (const char c : text) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (c == '"' || c == '\\') {
+  for (const Character& c : SplitCharacters(text)) {
+    if (c.code == '"' || c.code == '\\') {
       out += '\\';
-      out += c;
-    } else if (byte < 0x20 || byte == 0x7f) {
-      out += fmt::format("\\x{:02X}", byte);
+      out += c.bytes;
+    } else if (c.code != Character::kNotUtf8 && ControlsText(c.code)) {
+      out += c.code < 0x100 ? fmt::format("\\x{:02X}", static_cast<unsigned>(c.code))
+                            : fmt::format("\\u{:04X}", static_cast<unsigned>(c.code));
     } else {
-      out += c;
+      out += c.bytes;
     }
   }
   return out + '"';
@@ -333,6 +334,31 @@ ConfigLocation FindLocation(const ConfigNode& tree, std::string_view path) {
     node = child;
   }
   return node->location;
+}
+
+std::string CanonicalPath(std::string_view path) {
+  std::string canonical;
+  for (const Step& step : ParsePath(path)) {
+    canonical = step.index ? JoinPath(canonical, *step.index) : JoinPath(canonical, step.key);
+  }
+  return canonical;
+}
+
+bool SetsEntry(std::string_view path, const ConfigNode& value, std::string_view inner) {
+  const bool is_within =
+      inner.starts_with(path) &&
+      (inner.size() == path.size() || inner[path.size()] == '.' || inner[path.size()] == '[');
+  const std::vector<Step> steps = is_within ? ParsePath(inner) : std::vector<Step>();
+  const ConfigNode* node = is_within ? &value : nullptr;
+  for (std::size_t k = is_within ? ParsePath(path).size() : 0; node && k < steps.size(); ++k) {
+    const Step& step = steps[k];
+    if (node->IsNull() || (node->IsScalar() && step.key == "type")) {
+      return true;
+    }
+    const bool has_item = step.index && *step.index < node->items.size();
+    node = step.index ? (has_item ? &node->items[*step.index] : nullptr) : node->Find(step.key);
+  }
+  return node != nullptr;
 }
 
 void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,

@@ -117,6 +117,14 @@ ConfigLocation FindLocation(const ConfigNode& tree, std::string_view path);
 void SetPath(ConfigNode& tree, std::string_view path, const ConfigNode& value,
              const ConfigNode* defaults = nullptr);
 
+// Writes a path in its one form: "a.b[00]" is "a.b[0]". Throws ConfigError if it is malformed.
+std::string CanonicalPath(std::string_view path);
+
+// Returns true if `value` at `path` sets the entry at `inner` too, a path within it, or the same
+// one. The bare name of a variant's type sets its `type`; null sets everything. Both paths are
+// canonical.
+bool SetsEntry(std::string_view path, const ConfigNode& value, std::string_view inner);
+
 // An error at a path, worded as for ConfigErrors::Add.
 struct OptionFault {
   std::string path, what;

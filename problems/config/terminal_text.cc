@@ -1,20 +1,50 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/config/terminal_text.h"
 
-#include <cstddef>
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "problems/config/utf8_check.h"
 
 namespace semblance::problems {
+namespace {
 
-std::string ForTerminal(std::string_view text) {
+std::string ReplaceControls(std::string_view text, std::string_view kept) {
+  const auto is_plain = [&](char c) { return (c >= ' ' && c <= '~') || kept.find(c) != kept.npos; };
+  if (std::ranges::all_of(text, is_plain)) {
+    return std::string(text);
+  }
   std::string result;
-  for (std::size_t k = 0; k < text.size(); ++k) {
-    const auto c = static_cast<unsigned char>(text[k]);
-    const auto next = k + 1 < text.size() ? static_cast<unsigned char>(text[k + 1]) : 0;
-    const bool latin = c == 0xC2 && next >= 0x80 && next < 0xA0;  // U+0080 to U+009F
-    result.push_back(latin || (c < 0x20 && c != '\n') || c == 0x7F ? '?' : text[k]);
-    k += latin ? 1 : 0;
+  for (const Character& c : SplitCharacters(text)) {
+    const bool is_kept = c.bytes.size() == 1 && kept.find(c.bytes) != kept.npos;
+    result += !is_kept && ControlsText(c.code) ? "?" : c.bytes;
   }
   return result;
+}
+
+}  // namespace
+
+std::string ForTerminal(std::string_view text) { return ReplaceControls(text, "\n"); }
+
+std::string PlainText(std::string_view text) { return ReplaceControls(text, "\n\t"); }
+
+nlohmann::ordered_json WithPlainTexts(const nlohmann::ordered_json& json) {
+  if (json.is_string()) {
+    return PlainText(json.get_ref<const std::string&>());
+  }
+  if (!json.is_structured()) {
+    return json;
+  }
+  nlohmann::ordered_json plain =
+      json.is_array() ? nlohmann::ordered_json::array() : nlohmann::ordered_json::object();
+  for (const auto& [key, value] : json.items()) {
+    if (json.is_array()) {
+      plain.push_back(WithPlainTexts(value));
+    } else {
+      plain[PlainText(key)] = WithPlainTexts(value);
+    }
+  }
+  return plain;
 }
 
 std::string QuotedForShell(std::string_view text) {

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/config/utf8_check.h"
 
+#include <unicode/normalizer2.h>
+#include <unicode/unistr.h>
+
 #include <algorithm>
 
 namespace semblance::problems {
@@ -93,6 +96,50 @@ bool RequireReadableBytes(std::string_view text, const std::shared_ptr<const Con
     }
   }
   return is_readable;
+}
+
+std::vector<Character> SplitCharacters(std::string_view text) {
+  std::vector<Character> characters;
+  for (std::size_t k = 0; k < text.size();) {
+    const std::size_t length = SequenceLength(text, k);
+    Character next{.bytes = text.substr(k, std::max<std::size_t>(length, 1))};
+    if (length > 0) {
+      constexpr unsigned kFirstBits[] = {0, 0x7F, 0x1F, 0x0F, 0x07}, kMore = 0x3F;
+      next.code = ByteAt(text, k) & kFirstBits[length];
+      for (std::size_t n = 1; n < length; ++n) {
+        next.code = next.code << 6 | (ByteAt(text, k + n) & kMore);
+      }
+    }
+    characters.push_back(next);
+    k += next.bytes.size();
+  }
+  return characters;
+}
+
+bool ControlsText(char32_t code) {
+  const auto is_in = [code](char32_t first, char32_t last) {
+    return first <= code && code <= last;
+  };
+  return code < 0x20 || is_in(0x7F, 0x9F) || code == 0x061C || is_in(0x200E, 0x200F) ||
+         is_in(0x2028, 0x202E) || is_in(0x2066, 0x2069) || code == Character::kNotUtf8;
+}
+
+std::string Normalized(std::string_view text, NormalForm form) {
+  const bool is_ascii = std::ranges::all_of(text, [](unsigned char c) { return c < 0x80; });
+  if (is_ascii || LineThatIsNotUtf8(text)) {
+    return std::string(text);
+  }
+  UErrorCode error = U_ZERO_ERROR;
+  const icu::Normalizer2* const normalizer = form == NormalForm::kComposed
+                                                 ? icu::Normalizer2::getNFCInstance(error)
+                                                 : icu::Normalizer2::getNFDInstance(error);
+  std::string normalized;
+  const auto length = static_cast<std::int32_t>(text.size());
+  if (U_SUCCESS(error)) {
+    normalizer->normalize(icu::UnicodeString::fromUTF8({text.data(), length}), error)
+        .toUTF8String(normalized);
+  }
+  return U_SUCCESS(error) ? normalized : std::string(text);
 }
 
 std::optional<int> LineThatIsNotUtf8(std::string_view text) {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "problems/config/spelling_suggestion.h"
+#include "problems/config/utf8_check.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
@@ -55,10 +56,11 @@ bool InOrder(const Node& node, const std::string& found) {
                              : *a >= *b;
 }
 
-bool HoldsFor(const Node& node, const std::string& found) {
-  return node.sign == "=" || node.sign == "!=" ? Equal(found, node.value)
-         : node.sign == "~" ? ::fnmatch(node.value.c_str(), found.c_str(), 0) == 0
-                            : InOrder(node, found);
+bool HoldsFor(const Node& node, const std::string& given) {
+  const std::string found = Normalized(given), value = Normalized(node.value);
+  return node.sign == "=" || node.sign == "!=" ? Equal(found, value)
+         : node.sign == "~"                    ? ::fnmatch(value.c_str(), found.c_str(), 0) == 0
+                                               : InOrder(node, found);
 }
 
 bool Holds(const Node& node, const NamedValues& values) {

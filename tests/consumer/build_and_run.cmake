@@ -37,7 +37,7 @@ endif()
 
 # fitting requires no package that only the program needs.
 file(READ ${OUT}/build/CMakeCache.txt cache)
-foreach(package yaml-cpp SQLite3 PNG LibArchive pugixml)
+foreach(package yaml-cpp SQLite3 PNG LibArchive pugixml ICU)
   if(cache MATCHES "\n${package}_(DIR|FOUND|LIBRARY)")
     message(FATAL_ERROR "COMPONENTS fitting requires ${package}")
   endif()

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <vector>
 
+#include "problems/config/utf8_check.h"
+
 namespace semblance::problems {
 namespace {
 
@@ -26,9 +28,8 @@ std::string CutTo(const std::string& text, std::size_t most) {
 
 std::string EscapeHtml(std::string_view text) {
   std::string html;
-  for (const char c : text) {
-    const auto code = static_cast<unsigned char>(c);
-    switch (c) {
+  for (const Character& c : SplitCharacters(text)) {
+    switch (c.code) {
       case '&':
         html += "&amp;";
         break;
@@ -46,16 +47,12 @@ std::string EscapeHtml(std::string_view text) {
         break;
       case '\t':
       case '\n':
-        html += c;
+        html += c.bytes;
         break;
       case '\r':
         break;
       default:
-        if (code < 0x20 || code == 0x7F) {
-          html += "\uFFFD";
-        } else {
-          html += c;
-        }
+        html += ControlsText(c.code) ? "\uFFFD" : c.bytes;
     }
   }
   return html;

@@ -112,10 +112,13 @@ TEST(Config, MessagesAreExact) {
       // Texts that continue on the next line.
       {"label: \"a\ncount: 3\"",
        "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (write "
-       "a text of several lines as a block, after |)"},
+       "a text of several lines as a block, after |, or indent its next lines deeper)"},
       {"label: 'it''s\ncount: 3'",
        "x.yaml:1:8: label: the quote that begins here is not closed in its line; close it (write "
-       "a text of several lines as a block, after |)"},
+       "a text of several lines as a block, after |, or indent its next lines deeper)"},
+      {"values:\n  a: 1\nlabel: \"a\n  b\n count: 3\nradius_mm: 2\"",
+       "x.yaml:3:8: label: the quote that begins here is not closed in its line; close it "
+       "(write a text of several lines as a block, after |, or indent its next lines deeper)"},
       {"{label: a\n  b}",
        "x.yaml:1:9: label: a text within brackets continues on the next line; is a comma or a "
        "bracket missing?"},
@@ -129,6 +132,8 @@ TEST(Config, MessagesAreExact) {
       {"center_mm: [1, 2]", "x.yaml:1:12: center_mm: expected a list of 3, found 2"},
       {"center_mm: [1, 2, x]", "x.yaml:1:19: center_mm[2]: expected a number, found 'x'"},
       {"skull: ~/a.ply", "x.yaml:1:8: skull: '~/a.ply': ~ is not expanded; write the whole path"},
+      {"skull: \"a.ply\\0.obj\"",
+       "x.yaml:1:8: skull: a path cannot have the character NUL (\\0); leave it out"},
       {"- 1\n- 2", "x.yaml:1:1: expected a map of options at the top, found a list"},
       {"hello", "x.yaml:1:1: expected a map of options at the top, found a scalar"},
       // true and false.
@@ -189,6 +194,86 @@ TEST(Config, AllOfUnicodeIsReadAndTextsOfSeveralLinesAreBlocks) {
   EXPECT_EQ(Read("\xEF\xBB\xBFlabel: \"a \\\" b\"\n").label, "a \" b");
   EXPECT_EQ(Read("label: 'it''s'\n").label, "it's");
   EXPECT_EQ(Read("label: one\n  and two\n").label, "one and two");
+}
+
+// PyYAML folds texts after 80 columns. These are its own words for the text.
+TEST(Config, FoldedTextsAreReadAsPyYamlWritesThem) {
+  const std::string text =
+      "It's a long text with words, and: colons, so that it needs quotes, which go on beyond "
+      "eighty "
+      "columns for sure, and on";
+  EXPECT_EQ(
+      Read("label: 'It''s a long text with words, and: colons, so that it needs quotes, which\n"
+           "  go on beyond eighty columns for sure, and on'\ncount: 3\n")
+          .label,
+      text);
+  const Options options = Read(
+      "tags:\n- 'It''s a long text with words, and: colons, so that it needs quotes, which go on\n"
+      "  beyond eighty columns for sure, and on'\n- x\n"
+      "label: \"\\xE9 It's a long text with words, and: colons, so that it needs quotes, which\\\n"
+      "  \\ go on beyond eighty columns for sure, and on \\xFC\\e \\\\ \\\"x\\\"\"\n");
+  EXPECT_EQ(options.tags, (std::vector<std::string>{text, "x"}));
+  EXPECT_EQ(options.label, "\u00e9 " + text + " \u00fc\x1b \\ \"x\"");
+  EXPECT_EQ(Read("label: 'one\n\n  two\n\n\n  three it''s: x '\n").label,
+            "one\ntwo\n\nthree it's: x ");
+  EXPECT_EQ(Read("{count: 3, label: \"a\n  b\"}\n").label, "a b");
+  EXPECT_EQ(
+      Read("tags: [Its a long text with words and colons so that it needs quotes which go on "
+           "beyond\n    eighty columns for sure and on, x]\n")
+          .tags,
+      (std::vector<std::string>{"Its a long text with words and colons so that it needs quotes "
+                                "which go on beyond eighty columns for sure and on",
+                                "x"}));
+}
+
+TEST(Config, PlacesAfterAFoldedTextAreRight) {
+  EXPECT_EQ(ErrorsOf("label: \"a\n  b\n\n  c\"\ncount: x\nlast: {level: y}\n"),
+            "x.yaml:5:8: count: expected a whole number, found 'x'\n"
+            "x.yaml:6:15: last.level: expected a whole number, found 'y'");
+  EXPECT_EQ(ErrorsOf("tags:\n- 'a\n  b'\n- c\ncount: x\n"),
+            "x.yaml:5:8: count: expected a whole number, found 'x'");
+}
+
+// "\u00fc" is one character or two; a keyboard writes one and a Mac's file system two.
+TEST(Config, TextsAndKeysThatAreTheSameInUnicodeAreTheSame) {
+  const std::string composed = "M\u00fcller", decomposed = "Mu\u0308ller";
+  EXPECT_EQ(Read("label: " + decomposed).label, composed);
+  EXPECT_EQ(Read("tags: [\"" + decomposed + "\"]").tags, std::vector<std::string>{composed});
+  EXPECT_EQ(Read("values: {" + decomposed + ": 1}").values.count(composed), 1U);
+  EXPECT_EQ(
+      ErrorsOf("values: {" + decomposed + ": 1, " + composed + ": 2}"),
+      "x.yaml:1:23: values." + composed + ": the key appears twice; first at line 1, column 10");
+  const testing::ScratchFolder folder;
+  WriteFileAtomically(folder / (decomposed + ".ply"), "ply");
+  WriteFileAtomically(folder / "x.yaml", "skull: " + composed + ".ply\n");
+  EXPECT_EQ(ReadConfig<Options>(folder / "x.yaml").skull, folder / (decomposed + ".ply"));
+}
+
+TEST(Config, WrittenYamlHasNoControlCharactersAndReadsBack) {
+  Options options;
+  options.label = "a\x1b[31m \u009b \u202e \u2028 \u00e9\x7f";
+  const std::string yaml = WriteConfig(options);
+  EXPECT_THAT(yaml, HasSubstr(R"(label: "a\x1B[31m \x9B \u202E \u2028 é\x7F")"));
+  EXPECT_EQ(Read(yaml).label, options.label);
+}
+
+TEST(ConfigTree, SetsEntryFollowsThePathIntoTheValue) {
+  ConfigErrors errors;
+  const auto sets = [&](const char* path, const char* value, const char* inner) {
+    return SetsEntry(path, ParseConfigText(value, {.name = "x", .folder = "/"}, errors), inner);
+  };
+  EXPECT_TRUE(sets("a.b", "3", "a.b"));
+  EXPECT_TRUE(sets("a", "{b: 3}", "a.b"));
+  EXPECT_TRUE(sets("a", "{b: [1, {c: 2}]}", "a.b[1].c"));
+  EXPECT_TRUE(sets("a", "null", "a.b"));
+  EXPECT_TRUE(sets("a", "name", "a.type"));
+  EXPECT_FALSE(sets("a", "name", "a.b"));
+  EXPECT_FALSE(sets("a", "{b: 3}", "a.c"));
+  EXPECT_FALSE(sets("a", "{b: 3}", "ab"));
+  EXPECT_FALSE(sets("a.b", "3", "a"));
+  EXPECT_FALSE(sets("a", "[1]", "a[1]"));
+  EXPECT_EQ(CanonicalPath("a.b[00].c"), "a.b[0].c");
+  EXPECT_THROW(CanonicalPath("a..b"), ConfigError);
 }
 
 TEST(Config, ABaseOfANameThatNoFileCanHaveIsAnErrorLikeOthers) {
