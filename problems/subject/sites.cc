@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cctype>
 #include <iterator>
 #include <optional>
@@ -12,6 +13,8 @@
 #include <vector>
 
 #include "problems/config/spelling_suggestion.h"
+#include "problems/config/utf8_check.h"
+#include "surfaces/base/lower_case.h"
 
 namespace semblance::problems {
 namespace {
@@ -105,23 +108,71 @@ constexpr OtherName kOtherNames[] = {
     {"supraorbitale", "mso"}, {"mid infraorbital", "mio"}, {"infraorbital", "mio"},
     {"zygion", "zy"},         {"zygomatic arch", "zy"},    {"supra m 2", "sM2"},
     {"sub m 2", "iM2"},       {"infra m2", "iM2"},         {"mid ramus", "mr"},
+    {"ecm2", "sM2"},          {"ecm2 superior", "sM2"},    {"ecm2 inferior", "iM2"},
 };
 
-// Splits a name into words of letters and digits, in lower case.
-std::vector<std::string> SplitWords(std::string_view name) {
-  std::vector<std::string> words(1);
-  for (const char c : name) {
-    const auto byte = static_cast<unsigned char>(c);
-    if (std::isalnum(byte) != 0) {
-      words.back() += static_cast<char>(std::tolower(byte));
-    } else if (!words.back().empty()) {
-      words.emplace_back();
+// The words of a name, and whether it can name a site on bone.
+struct NameWords {
+  std::vector<std::string> words;  // of letters and digits, in lower case
+  bool has_prime = false;          // after a word, as in n'
+  bool has_other_sign = false;     // one that is neither a letter, a digit, a blank nor a separator
+  bool is_lower_index = false;     // has a 2 below the line, as in ecm with the lower jaw's index
+};
+
+bool IsOneOf(char32_t code, std::u32string_view list) { return list.find(code) != list.npos; }
+
+// Blanks, dashes and other signs between words.
+bool IsSeparator(char32_t code) {
+  return IsOneOf(code, U" \t_-.(),:;/[]{}\u00A0\u202F\u2212\u3000") ||
+         (code >= 0x2000 && code <= 0x2015);
+}
+
+// Signs that mark a point on the skin, typographic and typed.
+bool IsPrime(char32_t code) {
+  return IsOneOf(code,
+                 U"'`\"\u00B4\u02B9\u02BA\u02BC\u02CA\u2018\u2019\u201D\u2032\u2033\u2034\uFF07");
+}
+
+// Takes away quotes around a whole name.
+std::string_view Unquoted(std::string_view name) {
+  const bool is_quoted = name.size() > 2 && (name.front() == '\'' || name.front() == '"') &&
+                         name.back() == name.front();
+  return is_quoted ? name.substr(1, name.size() - 2) : name;
+}
+
+NameWords SplitName(std::string_view name) {
+  NameWords split;
+  split.words.emplace_back();
+  const std::string normal = Normalized(Unquoted(name));
+  for (const Character& c : SplitCharacters(normal)) {
+    constexpr char32_t kUpperTwo = 0xB2, kLowerTwo = 0x2082;
+    const bool is_two = c.code == kUpperTwo || c.code == kLowerTwo;
+    std::string& word = split.words.back();
+    if (is_two || (c.code < 0x80 && std::isalnum(static_cast<int>(c.code)) != 0)) {
+      word += is_two ? '2' : static_cast<char>(std::tolower(static_cast<int>(c.code)));
+      split.is_lower_index |= c.code == kLowerTwo;
+    } else if (IsPrime(c.code)) {
+      split.has_prime |= split.words.size() > 1 || !word.empty();
+    } else if (!IsSeparator(c.code)) {
+      split.has_other_sign = true;
+    } else if (!word.empty()) {
+      split.words.emplace_back();
     }
   }
-  if (words.back().empty()) {
-    words.pop_back();
+  if (split.words.back().empty()) {
+    split.words.pop_back();
   }
-  return words;
+  return split;
+}
+
+std::vector<std::string> SplitWords(std::string_view name) { return SplitName(name).words; }
+
+bool IsOnSkin(const NameWords& name) {
+  constexpr std::array<std::string_view, 6> kSkinWords = {"soft",      "tissue", "skin",
+                                                          "cutaneous", "dermal", "epidermal"};
+  return name.has_prime || std::ranges::any_of(name.words, [&](const std::string& word) {
+           return std::ranges::find(kSkinWords, word) != kSkinWords.end();
+         });
 }
 
 std::optional<Side> ParseSide(std::string_view word) {
@@ -159,6 +210,27 @@ Side RemoveSide(std::vector<std::string>& words) {
   return Side::kMidline;
 }
 
+bool IsCodeOfPair(const std::string& word) {
+  return std::ranges::any_of(AllSites(), [&](const Site& site) {
+    return site.side != Side::kMidline && word == LowerCase(site.landmark);
+  });
+}
+
+// Splits "gol" into "go" and "l", if no landmark has the whole as its code.
+void DetachSide(std::vector<std::string>& words) {
+  const std::string& word = words.back();
+  const bool is_code = std::ranges::any_of(
+      AllSites(), [&](const Site& site) { return word == LowerCase(site.landmark); });
+  if (words.size() != 1 || is_code || word.size() < 2 ||
+      (word.back() != 'l' && word.back() != 'r')) {
+    return;
+  }
+  const std::string code = word.substr(0, word.size() - 1), side = word.substr(word.size() - 1);
+  if (code == "ecm2" || IsCodeOfPair(code)) {
+    words = {code, side};
+  }
+}
+
 std::string Joined(const std::vector<std::string>& words) {
   return fmt::format("{}", fmt::join(words, " "));
 }
@@ -184,7 +256,19 @@ NamedSite UnknownName(std::string_view name) {
       .code = "",
       .fault = fmt::format("'{}' is not a site{}; use a code such as g or go_l, a number of the "
                            "thesis (1 to 21, with l or r) or a name such as 'left gonion'",
-                           name, near.empty() ? "" : fmt::format("; did you mean '{}'?", near))};
+                           name, near.empty() ? "" : fmt::format("; did you mean '{}'?", near)),
+      .note = ""};
+}
+
+// ecm2 is the bone's point of the second molar in either jaw, if no index above or below the line
+// distinguishes them.
+std::string NoteOnName(std::string_view name, const std::string& landmark,
+                       const std::string& code) {
+  const bool has_index = name.find("\u00B2") != name.npos;
+  return landmark != "ecm2" || has_index
+             ? ""
+             : fmt::format("'{}' is taken for {}; name the point of the lower jaw iM2", name,
+                           DescribeSite(code));
 }
 
 }  // namespace
@@ -247,18 +331,28 @@ std::string SiteFault(std::string_view site) {
 }
 
 NamedSite FindSiteByName(std::string_view name) {
-  std::vector<std::string> words = SplitWords(name);
-  if (words.empty()) {
+  NameWords split = SplitName(name);
+  std::vector<std::string>& words = split.words;
+  if (IsOnSkin(split)) {
+    return {.code = "",
+            .fault = fmt::format("'{}' names a point on the skin, and landmarks are points on the "
+                                 "bone; place the bone's point, or leave this one out",
+                                 name),
+            .note = ""};
+  }
+  if (words.empty() || split.has_other_sign) {
     return UnknownName(name);
   }
+  DetachSide(words);
   const Side side = RemoveSide(words);
-  const std::string landmark = Joined(words);
+  const std::string landmark =
+      split.is_lower_index && words == std::vector<std::string>{"ecm2"} ? "im2" : Joined(words);
   std::optional<Site> named;
   for (const Site& site : AllSites()) {
     if (IsNamed(site, landmark)) {
       named = site;
       if (site.side == side) {
-        return {.code = site.code, .fault = ""};
+        return {.code = site.code, .fault = "", .note = NoteOnName(name, landmark, site.code)};
       }
     }
   }
@@ -271,7 +365,8 @@ NamedSite FindSiteByName(std::string_view name) {
                    ? fmt::format("'{0}' is on both sides; state the side, as '{1}_l' or '{1}_r'",
                                  name, named->landmark)
                    : fmt::format("'{}' has a side, and {} lies in the midline; write '{}'", name,
-                                 DescribeSite(named->code), named->code)};
+                                 DescribeSite(named->code), named->code),
+      .note = ""};
 }
 
 std::vector<std::string> OtherSiteNames(std::string_view landmark) {

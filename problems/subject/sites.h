@@ -58,13 +58,17 @@ std::string SiteFault(std::string_view site);
 struct NamedSite {
   std::string code;   // standard or further; empty if the name is not understood
   std::string fault;  // the fault and the remedy in that case; otherwise empty
+  std::string note;   // for people, if the name could also mean another site; mostly empty
 };
 
-// Finds the standard or further site that a name means. Upper and lower case, blanks, '_', '-', '.'
-// and parentheses make no difference. The landmark is a code ("go"), its number in the thesis (18)
-// or a name ("gonion", "end of nasals", "rhinion"). The side is l, r, left or right, before or
-// after the landmark ("left gonion", "Gonion (L)", "go_L", "18r"). A landmark in the midline takes
-// no side; a landmark of a pair needs one.
+// Finds the standard or further site that a name means. Upper and lower case, blanks, dashes, '_',
+// '.', ',', ':', ';', '/', brackets and quotes around the name make no difference; any other sign
+// makes a name unknown. The landmark is a code ("go"), its number in the thesis (18) or a name
+// ("gonion", "end of nasals", "rhinion"). The side is l, r, left or right, before or after the
+// landmark ("left gonion", "Gonion (L)", "go_L", "18r"), or directly after a code ("goL", as Caple
+// and Stephan 2016 write). A landmark in the midline takes no side; a landmark of a pair needs one.
+// A name with a prime ("n'") or with a word such as "soft" or "skin" means a point on the skin, and
+// so no site.
 NamedSite FindSiteByName(std::string_view name);
 
 // Further names of a landmark ("go"), besides its code, number and printed name.

@@ -58,11 +58,17 @@ std::size_t CsvReader::RequireColumn(std::string_view column) const {
   return *found;
 }
 
+bool CsvReader::IsEmptyRow() const {
+  return std::all_of(cells_.begin(), cells_.end(), [](std::string_view c) { return c.empty(); });
+}
+
 bool CsvReader::NextRow() {
-  if (rest_.empty()) {
-    return false;
-  }
-  ReadCells();
+  do {
+    if (rest_.empty()) {
+      return false;
+    }
+    ReadCells();
+  } while (dialect_.skips_empty_rows && IsEmptyRow());
   const bool is_empty = cells_.size() == 1 && cells_[0].empty();
   if (is_empty && columns_.size() > 1) {
     Fail("the line is empty; leave it out");
@@ -121,7 +127,8 @@ void CsvReader::ReadCells() {
   unquoted_.clear();
   bool more = true;
   while (more) {
-    const std::size_t first = std::min(rest_.find_first_not_of(kBlanks), rest_.size());
+    const std::string_view blanks = dialect_.separator == '\t' ? " " : kBlanks;
+    const std::size_t first = std::min(rest_.find_first_not_of(blanks), rest_.size());
     cells_.push_back(rest_.substr(first, 1) == "\"" ? TakeQuoted() : TakePlain());
     more = rest_.starts_with(dialect_.separator);
     rest_.remove_prefix(more ? 1 : 0);

@@ -18,8 +18,9 @@ namespace semblance::surfaces {
 // Separator and decimal sign. In countries with a decimal comma, spreadsheets separate by
 // semicolons.
 struct CsvDialect {
-  char separator = ',';
+  char separator = ',';  // also ';' or a tab
   char decimal = '.';
+  bool skips_empty_rows = false;  // rows without any entry, which spreadsheets leave at the end
 };
 
 // Reads a table row by row. A cell may be quoted, with "" for a quote inside. Blanks around an
@@ -51,6 +52,7 @@ class CsvReader {
 
  private:
   void ReadCells();
+  bool IsEmptyRow() const;
   std::string_view TakeQuoted();
   std::string_view TakePlain();
   std::optional<double> ToNumber(std::string_view text) const;

@@ -9,8 +9,11 @@
 #include <initializer_list>
 #include <optional>
 #include <set>
+#include <utility>
 
+#include "problems/subject/landmark_files/point_files.h"
 #include "surfaces/base/csv.h"
+#include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 
 namespace semblance::problems {
@@ -30,6 +33,10 @@ class Columns {
       }
     }
     return std::nullopt;
+  }
+  bool Has(std::string_view name) const {
+    return std::ranges::any_of(
+        table_.Columns(), [&](const std::string& column) { return LowerCase(column) == name; });
   }
   std::size_t Need(std::initializer_list<std::string_view> names) {
     const auto found = Find(names);
@@ -54,27 +61,61 @@ class Columns {
   std::set<std::size_t> used_;
 };
 
-struct TableLayout {
-  std::size_t site, x, y, z;
-  std::array<std::optional<std::size_t>, 3> normal;
-  std::optional<std::size_t> depth_along_normal, depth_closest, certainty, note;
+// The columns of the coordinates, and the axes that their names state.
+struct TableCoordinates {
+  std::array<std::size_t, 3> xyz;
+  std::string axes;
 };
 
-TableLayout FindLayout(Columns& columns) {
+// Finds x, y, z, or Slicer's l, p, s or r, a, s. Fails if a table has two of the three.
+TableCoordinates FindCoordinates(Columns& columns, const CsvReader& table) {
+  std::vector<TableCoordinates> found;
+  for (const auto& [names, axes] :
+       {std::pair(std::array{"l", "p", "s"}, "LPS"), std::pair(std::array{"r", "a", "s"}, "RAS")}) {
+    if (columns.Has(names[0]) && columns.Has(names[1]) && columns.Has(names[2])) {
+      found.push_back(
+          {{*columns.Find({names[0]}), *columns.Find({names[1]}), *columns.Find({names[2]})},
+           axes});
+    }
+  }
+  if (found.empty() || columns.Has("x") || columns.Has("x_mm")) {
+    found.push_back(
+        {{columns.Need({"x", "x_mm"}), columns.Need({"y", "y_mm"}), columns.Need({"z", "z_mm"})},
+         ""});
+  }
+  if (found.size() > 1) {
+    table.Fail("the columns hold the coordinates twice; keep x, y, z or l, p, s or r, a, s");
+  }
+  return found.front();
+}
+
+struct TableLayout {
+  std::size_t site;
+  TableCoordinates point;
+  std::array<std::optional<std::size_t>, 3> normal;
+  std::optional<std::size_t> depth_along_normal, depth_closest, certainty, note;
+  std::optional<std::size_t> defined, missing, status, selected, visible;
+};
+
+TableLayout FindLayout(Columns& columns, const CsvReader& table) {
   return {.site = columns.Need({"site", "landmark", "label", "name"}),
-          .x = columns.Need({"x", "x_mm"}),
-          .y = columns.Need({"y", "y_mm"}),
-          .z = columns.Need({"z", "z_mm"}),
+          .point = FindCoordinates(columns, table),
           .normal = {columns.Find({"normal_x"}), columns.Find({"normal_y"}),
                      columns.Find({"normal_z"})},
           .depth_along_normal = columns.Find({"depth_along_normal_mm"}),
           .depth_closest = columns.Find({"depth_closest_mm"}),
           .certainty = columns.Find({"certainty"}),
-          .note = columns.Find({"note", "description"})};
+          .note = columns.Find({"note", "description"}),
+          .defined = columns.Find({"defined", "placed", "valid", "present"}),
+          .missing = columns.Find({"missing", "absent", "undefined"}),
+          .status = columns.Find({"position_status", "positionstatus", "position status"}),
+          .selected = columns.Find({"selected"}),
+          .visible = columns.Find({"visible"})};
 }
 
 std::vector<std::size_t> NumberColumns(const TableLayout& layout) {
-  std::vector<std::size_t> columns = {layout.x, layout.y, layout.z};
+  const auto& xyz = layout.point.xyz;
+  std::vector<std::size_t> columns = {xyz[0], xyz[1], xyz[2]};
   for (const auto& column : {layout.normal[0], layout.normal[1], layout.normal[2],
                              layout.depth_along_normal, layout.depth_closest}) {
     if (column) {
@@ -86,7 +127,7 @@ std::vector<std::size_t> NumberColumns(const TableLayout& layout) {
 
 bool HasDecimalCommas(CsvReader table) {
   Columns columns(table);
-  const std::vector<std::size_t> numbers = NumberColumns(FindLayout(columns));
+  const std::vector<std::size_t> numbers = NumberColumns(FindLayout(columns, table));
   const auto has_comma = [&](std::size_t k) {
     return table.Cell(k).find(',') != std::string::npos;
   };
@@ -100,13 +141,12 @@ bool HasDecimalCommas(CsvReader table) {
 
 CsvDialect DetectDialect(std::string_view text, std::string_view file) {
   const std::string_view first = text.substr(0, text.find('\n'));
-  if (first.find(';') == first.npos) {
-    return {};
+  CsvDialect dialect{.skips_empty_rows = true};
+  if (first.find_first_of(";\t") != first.npos) {
+    dialect.separator = first.find(';') != first.npos ? ';' : '\t';
+    dialect.decimal = HasDecimalCommas(CsvReader(text, file, dialect)) ? ',' : '.';
   }
-  const CsvDialect points = {.separator = ';', .decimal = '.'};
-  return HasDecimalCommas(CsvReader(text, file, points))
-             ? CsvDialect{.separator = ';', .decimal = ','}
-             : points;
+  return dialect;
 }
 
 std::optional<double> NumberAt(const CsvReader& table, std::optional<std::size_t> column) {
@@ -138,9 +178,41 @@ Certainty CertaintyAt(const CsvReader& table, std::optional<std::size_t> column)
   return static_cast<Certainty>(found - words.begin());
 }
 
+// A cell of a column of yes and no; nothing if there is no such column or the cell is empty.
+std::optional<bool> AnswerAt(const CsvReader& table, std::optional<std::size_t> column) {
+  const std::string word = column ? LowerCase(std::string(table.Cell(*column))) : "";
+  if (word == "1" || word == "true" || word == "yes") {
+    return true;
+  }
+  if (word == "0" || word == "false" || word == "no") {
+    return false;
+  }
+  if (!word.empty()) {
+    table.Fail(fmt::format("column '{}': '{}' is neither 0 nor 1", table.Columns()[*column], word));
+  }
+  return std::nullopt;
+}
+
+// The reason why the site of a row has no point; empty if it has one.
+std::string ReadAbsence(const CsvReader& table, const TableLayout& layout) {
+  for (const auto& [column, absent_if] :
+       {std::pair(layout.defined, false), std::pair(layout.missing, true)}) {
+    if (const auto answer = AnswerAt(table, column); answer && *answer == absent_if) {
+      return fmt::format("{} is {} in the table", table.Columns()[*column], absent_if ? 1 : 0);
+    }
+  }
+  const std::string status = layout.status ? std::string(table.Cell(*layout.status)) : "";
+  try {
+    return status.empty() ? "" : AbsenceReason(status);
+  } catch (const IoError& error) {
+    table.Fail(error.what());
+  }
+}
+
 Landmark ReadRow(const CsvReader& table, const TableLayout& layout) {
+  const auto& xyz = layout.point.xyz;
   return {.site = std::string(table.Cell(layout.site)),
-          .point = {table.Number(layout.x), table.Number(layout.y), table.Number(layout.z)},
+          .point = {table.Number(xyz[0]), table.Number(xyz[1]), table.Number(xyz[2])},
           .normal = NormalAt(table, layout),
           .depth_along_normal_mm = NumberAt(table, layout.depth_along_normal),
           .depth_closest_mm = NumberAt(table, layout.depth_closest),
@@ -151,15 +223,29 @@ Landmark ReadRow(const CsvReader& table, const TableLayout& layout) {
 }  // namespace
 
 LandmarkFile ParseLandmarkTable(std::string_view text, std::string_view file,
-                                std::vector<std::string>& ignored) {
+                                std::vector<std::string>& notes) {
   CsvReader table(text, file, DetectDialect(text, file));
   Columns columns(table);
-  const TableLayout layout = FindLayout(columns);
-  ignored = columns.Unused();
-  LandmarkFile result{.subject = "", .units = "mm", .axes = "", .landmarks = {}, .absent = {}};
-  while (table.NextRow()) {
-    result.landmarks.push_back(ReadRow(table, layout));
+  const TableLayout layout = FindLayout(columns, table);
+  columns.Find({"locked"});  // concerns the mouse in Slicer
+  if (const std::vector<std::string> ignored = columns.Unused(); !ignored.empty()) {
+    notes.push_back(fmt::format("{}: ignored columns: {}", file, fmt::join(ignored, ", ")));
   }
+  LandmarkFile result{
+      .subject = "", .units = "mm", .axes = layout.point.axes, .landmarks = {}, .absent = {}};
+  std::vector<std::string> hidden;
+  while (table.NextRow()) {
+    const std::string site(table.Cell(layout.site)), reason = ReadAbsence(table, layout);
+    if (!reason.empty()) {
+      result.absent.push_back({site, reason});
+      continue;
+    }
+    result.landmarks.push_back(ReadRow(table, layout));
+    if (AnswerAt(table, layout.selected) == false || AnswerAt(table, layout.visible) == false) {
+      hidden.push_back(site);
+    }
+  }
+  NoteHidden(file, hidden, notes);
   return result;
 }
 

@@ -2,10 +2,13 @@
 #include "problems/subject/landmark_files/markups_json.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <nlohmann/json.hpp>
 
+#include "problems/subject/landmark_files/point_files.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 
@@ -66,32 +69,14 @@ std::array<double, 3> ReadPosition(const Json& point) {
   return {p.x(), p.y(), p.z()};
 }
 
-// The reason why a point has no position, from Slicer's four states; empty if it has one.
-std::string AbsenceReason(const Json& point) {
-  const std::string status = ReadText(point, "positionStatus", "defined");
-  if (status == "defined") {
-    return "";
-  }
-  if (status == "undefined") {
-    return "not placed";
-  }
-  if (status == "missing") {
-    return "marked as missing in Slicer";
-  }
-  if (status == "preview") {
-    return "not placed, only previewed in Slicer";
-  }
-  throw IoError(fmt::format(
-      "'positionStatus' is '{}'; it must be defined, undefined, missing or preview", status));
-}
-
 void AddPoint(const Json& point, LandmarkFile& file) {
   if (!point.is_object()) {
     throw IoError("'controlPoints' must list objects");
   }
   Landmark landmark;
   landmark.site = ReadText(point, "label", "");
-  if (const std::string reason = AbsenceReason(point); !reason.empty()) {
+  const std::string status = ReadText(point, "positionStatus", "defined");
+  if (const std::string reason = AbsenceReason(status); !reason.empty()) {
     file.absent.push_back({landmark.site, reason});
     return;
   }
@@ -119,9 +104,46 @@ void AddPoints(const Json& markup, LandmarkFile& file) {
   }
 }
 
-LandmarkFile FromJson(const Json& json) {
+// True for a point whose `visibility` or `selected` is false.
+bool IsHidden(const Json& point) {
+  return std::ranges::any_of(std::array{"visibility", "selected"}, [&](const char* key) {
+    const auto found = point.find(key);
+    return found != point.end() && found->is_boolean() && !found->get<bool>();
+  });
+}
+
+// The labels of the control points; of those that have none, nothing.
+std::vector<std::string> ListLabels(const Json& markup, bool (*wanted)(const Json& point)) {
+  std::vector<std::string> labels;
+  const auto points = markup.find("controlPoints");
+  for (const Json& point : points == markup.end() ? Json::array() : *points) {
+    if (point.is_object() && wanted(point)) {
+      labels.push_back(ReadText(point, "label", ""));
+    }
+  }
+  return labels;
+}
+
+void NoteLeftOut(std::string_view file, const std::string& type, const Json& markup,
+                 std::vector<std::string>& notes) {
+  constexpr std::size_t kMostLabels = 5;
+  std::vector<std::string> labels = ListLabels(markup, [](const Json&) { return true; });
+  const std::size_t count = labels.size();
+  labels.resize(std::min(count, kMostLabels));
+  notes.push_back(
+      fmt::format("{}: left out a markup of type {} with {} points ({}{}); only the points of type "
+                  "Fiducial are "
+                  "landmarks",
+                  file, type, count, fmt::join(labels, ", "), count > kMostLabels ? ", ..." : ""));
+}
+
+LandmarkFile FromJson(const Json& json, std::string_view name, std::vector<std::string>& notes) {
   LandmarkFile file{.subject = "", .units = "mm", .axes = "", .landmarks = {}, .absent = {}};
   for (const Json& markup : json_parts::ListFromJson(json, "markups")) {
+    if (const std::string type = ReadText(markup, "type", "Fiducial"); type != "Fiducial") {
+      NoteLeftOut(name, type, markup, notes);
+      continue;
+    }
     const std::string axes = ReadAxes(markup);
     if (!file.axes.empty() && file.axes != axes) {
       throw IoError("its markups have different axes; export them one by one");
@@ -129,6 +151,7 @@ LandmarkFile FromJson(const Json& json) {
     file.axes = axes;
     RequireMillimetres(markup);
     AddPoints(markup, file);
+    NoteHidden(name, ListLabels(markup, &IsHidden), notes);
   }
   return file;
 }
@@ -145,9 +168,10 @@ Json PointJson(const Landmark& landmark, std::size_t number) {
 
 }  // namespace
 
-LandmarkFile ParseMarkupsJson(std::string_view text, std::string_view file) {
+LandmarkFile ParseMarkupsJson(std::string_view text, std::string_view file,
+                              std::vector<std::string>& notes) {
   try {
-    return FromJson(json_parts::ParseWithoutRepeats(text));
+    return FromJson(json_parts::ParseWithoutRepeats(text), file, notes);
   } catch (const nlohmann::json::exception& error) {
     throw IoError(fmt::format("{}: {}", file, JsonFault(error)));
   } catch (const IoError& error) {

@@ -105,7 +105,9 @@ void PointLines::Fail(std::string_view what) const {
 // The contents of the lines that begin with '#'.
 struct FcsvHeader {
   std::string axes;
-  std::vector<std::string> columns = {"id", "x", "y", "z", "", "", "", "", "", "", "", "label"};
+  std::vector<std::string> columns = {
+      "id", "x",   "y",   "z",    "ow",    "ox",   "oy",
+      "oz", "vis", "sel", "lock", "label", "desc", "associatedNodeID"};
 
   std::size_t Column(const PointLines& lines, std::string_view name) const {
     const auto found = std::find(columns.begin(), columns.end(), name);
@@ -136,7 +138,11 @@ void ReadHeaderLine(const PointLines& lines, FcsvHeader& header) {
   }
   const std::string_view value = TrimBlanks(line.substr(equals + 1));
   if (line.find("CoordinateSystem") < equals) {
-    header.axes = ReadAxes(lines, value);
+    const std::string axes = ReadAxes(lines, value);
+    if (!header.axes.empty() && header.axes != axes) {
+      lines.Fail("a second coordinate system, which differs from the first; keep the right one");
+    }
+    header.axes = axes;
   } else if (line.find("columns") < equals) {
     header.columns = SplitCells(value, ',');
     constexpr std::size_t kMaxColumns = 100;  // each point searches the columns by name
@@ -147,18 +153,51 @@ void ReadHeaderLine(const PointLines& lines, FcsvHeader& header) {
   }
 }
 
-Landmark ReadFcsvPoint(const PointLines& lines, const FcsvHeader& header) {
-  const std::vector<std::string> cells = SplitCells(lines.line(), ',');
+// The status of a point, which Slicer writes behind the cells that the header names; empty if there
+// is none.
+std::string TakeStatus(const PointLines& lines, const FcsvHeader& header,
+                       std::vector<std::string>& cells) {
+  const std::size_t named = header.columns.size();
+  while (cells.size() > named && cells.back().empty()) {
+    cells.pop_back();  // follows a separator at the line's end
+  }
+  if (cells.size() > named + 2) {
+    lines.Fail(fmt::format(
+        "{} cells, where the header names {} and Slicer adds at most 2; quote texts with commas, "
+        "and write decimal points",
+        cells.size(), named));
+  }
+  return cells.size() > named ? cells[named] : "";
+}
+
+// Adds the point of a row, or its site as absent. Adds its site to `hidden` if Slicer hides it.
+void ReadFcsvRow(const PointLines& lines, const FcsvHeader& header, LandmarkFile& file,
+                 std::vector<std::string>& hidden) {
+  std::vector<std::string> cells = SplitCells(lines.line(), ',');
+  const std::string status = TakeStatus(lines, header, cells);
   const auto cell = [&](std::string_view name) {
     const std::size_t column = header.Column(lines, name);
     return column < cells.size() ? cells[column] : std::string();
   };
+  const auto optional_cell = [&](std::string_view name) {
+    return std::ranges::find(header.columns, name) != header.columns.end() ? cell(name) : "";
+  };
   Landmark landmark;
   landmark.site = cell("label");
+  try {
+    if (const std::string reason = status.empty() ? "" : AbsenceReason(status); !reason.empty()) {
+      file.absent.push_back({landmark.site, reason});
+      return;
+    }
+  } catch (const IoError& error) {
+    lines.Fail(error.what());
+  }
   landmark.point = {lines.Number(cell("x")), lines.Number(cell("y")), lines.Number(cell("z"))};
-  const bool described = std::ranges::find(header.columns, "desc") != header.columns.end();
-  landmark.note = described ? cell("desc") : "";
-  return landmark;
+  landmark.note = optional_cell("desc");
+  if (optional_cell("vis") == "0" || optional_cell("sel") == "0") {
+    hidden.push_back(landmark.site);
+  }
+  file.landmarks.push_back(landmark);
 }
 
 std::string Quoted(const std::string& text) {
@@ -237,23 +276,50 @@ Landmark ReadListedPoint(const PointLines& lines) {
 
 }  // namespace
 
-LandmarkFile ParseFcsv(std::string_view text, std::string_view file) {
+std::string AbsenceReason(std::string_view status) {
+  if (status == "defined" || status == "2") {
+    return "";
+  }
+  if (status == "undefined" || status == "0") {
+    return "not placed";
+  }
+  if (status == "missing" || status == "3") {
+    return "marked as missing in Slicer";
+  }
+  if (status == "preview" || status == "1") {
+    return "not placed, only previewed in Slicer";
+  }
+  throw IoError(fmt::format(
+      "the position status is '{}'; it must be defined (2), undefined (0), missing (3) or preview "
+      "(1)",
+      status));
+}
+
+void NoteHidden(std::string_view file, const std::vector<std::string>& sites,
+                std::vector<std::string>& notes) {
+  if (!sites.empty()) {
+    notes.push_back(fmt::format(
+        "{}: hidden or not selected in Slicer, and read all the same: {}; delete points that do "
+        "not count, or mark them as missing",
+        file, fmt::join(sites, ", ")));
+  }
+}
+
+LandmarkFile ParseFcsv(std::string_view text, std::string_view file,
+                       std::vector<std::string>& notes) {
   LandmarkFile result{.subject = "", .units = "mm", .axes = "", .landmarks = {}, .absent = {}};
   FcsvHeader header;
   PointLines lines(text, file);
+  std::vector<std::string> hidden;
   while (lines.Next()) {
     if (lines.line().front() == '#') {
       ReadHeaderLine(lines, header);
     } else {
-      result.landmarks.push_back(ReadFcsvPoint(lines, header));
+      ReadFcsvRow(lines, header, result, hidden);
     }
   }
-  if (header.axes.empty()) {
-    lines.Fail(
-        "the line '# CoordinateSystem = ...' with LPS or RAS is missing; save the list again in "
-        "Slicer");
-  }
   result.axes = header.axes;
+  NoteHidden(file, hidden, notes);
   return result;
 }
 
@@ -284,7 +350,7 @@ LandmarkFile ParseMeshLabPoints(std::string_view text, std::string_view file) {
     Landmark landmark;
     landmark.site = point.attribute("name").as_string();
     ++number;
-    if (point.attribute("active").as_string("1") == std::string_view("0")) {
+    if (!point.attribute("active").as_bool(/*def=*/true)) {
       result.absent.push_back({landmark.site, "not active"});
     } else {
       landmark.point =

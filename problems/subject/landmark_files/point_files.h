@@ -6,16 +6,30 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "problems/subject/landmarks.h"
 
 namespace semblance::problems {
 
+// The reason why a point has no position, from Slicer's status: undefined (0), preview (1), defined
+// (2) or missing (3); empty for a defined point. Throws IoError, without the file's name, for
+// another status.
+std::string AbsenceReason(std::string_view status);
+
+// Adds a note on sites whose points are hidden or not selected in Slicer; none if there is no site.
+void NoteHidden(std::string_view file, const std::vector<std::string>& sites,
+                std::vector<std::string>& notes);
+
 // Reads a fiducial list. Labels become `site`, descriptions `note`; coordinates stay as they are.
-// `axes` is LPS or RAS as the header states (old files have numbers: 0 is RAS, 1 is LPS). Throws
-// IoError with the line for any other text: no axes, no columns x, y, z and label, or a coordinate
-// that is not a finite number.
-LandmarkFile ParseFcsv(std::string_view text, std::string_view file);
+// Slicer 5.2 and later add one or two cells to each row that the header does not name; the first is
+// the point's status, and a point that is not defined becomes an absent site, whatever its
+// coordinates. `axes` is LPS or RAS as the header states (old files have numbers: 0 is RAS, 1 is
+// LPS), or empty, as in files of Slicer 3. `notes` receives a note on hidden points. Throws IoError
+// with the line for any other text: no columns x, y, z and label, more cells than the header
+// explains, or a coordinate that is not a finite number.
+LandmarkFile ParseFcsv(std::string_view text, std::string_view file,
+                       std::vector<std::string>& notes);
 
 // Writes a fiducial list in LPS. Normals, depths and certainties are lost.
 std::string Fcsv(const LandmarkFile& file);

@@ -25,15 +25,6 @@ namespace {
 namespace fs = std::filesystem;
 using ReadNotes = std::vector<std::string>;
 
-LandmarkFile ParseTable(std::string_view text, std::string_view file, ReadNotes& notes) {
-  std::vector<std::string> ignored;
-  LandmarkFile result = ParseLandmarkTable(text, file, ignored);
-  if (!ignored.empty()) {
-    notes.push_back(fmt::format("{}: ignored columns: {}", file, fmt::join(ignored, ", ")));
-  }
-  return result;
-}
-
 // A file format, with its parser and its writer.
 struct Format {
   std::string_view extension;
@@ -42,6 +33,7 @@ struct Format {
   bool holds_measurements;  // normals, depths and certainties
   bool holds_notes;
   bool states_encoding = false;  // XML, whose parser converts any encoding to UTF-8
+  bool needs_axes = false;       // its points are LPS or RAS alike, so axes are never assumed
 };
 
 std::string CloudComparePoints(const LandmarkFile& file) {
@@ -60,10 +52,15 @@ LandmarkFile WithoutNotes(std::string_view text, std::string_view file, ReadNote
 constexpr std::array kFormats = {
     Format{".yaml", nullptr, &WriteConfig<LandmarkFile>, true, true},
     Format{".yml", nullptr, &WriteConfig<LandmarkFile>, true, true},
-    Format{".mrk.json", &WithoutNotes<&ParseMarkupsJson>, &MarkupsJson, false, true},
-    Format{".fcsv", &WithoutNotes<&ParseFcsv>, &Fcsv, false, true},
+    Format{".mrk.json", &ParseMarkupsJson, &MarkupsJson, false, true},
+    Format{.extension = ".fcsv",
+           .parse = &ParseFcsv,
+           .encode = &Fcsv,
+           .holds_measurements = false,
+           .holds_notes = true,
+           .needs_axes = true},
     Format{".pp", &WithoutNotes<&ParseMeshLabPoints>, &MeshLabPoints, false, false, true},
-    Format{".csv", &ParseTable, &LandmarkTable, true, true},
+    Format{".csv", &ParseLandmarkTable, &LandmarkTable, true, true},
     Format{".txt", &WithoutNotes<&ParsePointList>, &CloudComparePoints, false, false},
     Format{".asc", &WithoutNotes<&ParsePointList>, &CloudComparePoints, false, false},
 };
@@ -96,6 +93,9 @@ void NameSites(const ReadLandmarksOptions& options, std::vector<Entry>& entries,
   for (Entry& entry : entries) {
     const NamedSite site = FindSiteByName(entry.site);
     if (!site.code.empty()) {
+      if (!site.note.empty()) {
+        notes.push_back(site.note);
+      }
       entry.site = site.code;
       known.push_back(entry);
     } else if (options.leave_out_unknown) {
@@ -105,6 +105,26 @@ void NameSites(const ReadLandmarksOptions& options, std::vector<Entry>& entries,
     }
   }
   entries = std::move(known);
+}
+
+// Finds points that nobody placed: a program leaves them at the origin.
+void FindUnplaced(const fs::path& path, const LandmarkFile& file, ReadNotes& notes,
+                  std::vector<std::string>& faults) {
+  std::vector<std::string> sites;
+  for (const Landmark& landmark : file.landmarks) {
+    if (landmark.point == std::array{0.0, 0.0, 0.0}) {
+      sites.push_back(landmark.site);
+    }
+  }
+  if (sites.size() > 1) {
+    faults.push_back(
+        fmt::format("sites {} are at the same point 0, 0, 0, so they were never placed; "
+                    "place them or take them out",
+                    fmt::join(sites, ", ")));
+  } else if (!sites.empty()) {
+    notes.push_back(fmt::format("{}: site {} is at 0, 0, 0; check that it was placed",
+                                path.filename().string(), sites.front()));
+  }
 }
 
 void FindRepeats(const LandmarkFile& file, std::vector<std::string>& faults) {
@@ -129,6 +149,13 @@ std::string_view RemedyForAxes(const Format& format) {
 
 void ChooseAxes(const fs::path& path, const ReadLandmarksOptions& options, LandmarkFile& file,
                 ReadNotes& notes) {
+  if (file.axes.empty() && !options.axes && FindFormat(path).needs_axes) {
+    throw IoError(
+        fmt::format("{}: the line '# CoordinateSystem = ...' with LPS or RAS is missing; save the "
+                    "list again in "
+                    "Slicer, or convert it with --axes (lists of Slicer 3 are RAS)",
+                    path.string()));
+  }
   if (file.axes.empty() && !options.axes) {
     notes.push_back(fmt::format("{}: the file does not state its axes; taken as LPS",
                                 path.filename().string()));
@@ -190,8 +217,11 @@ LandmarkReading ReadForeign(const fs::path& path, const Format& format,
   NameSites(options, file.landmarks, reading.notes, faults);
   NameSites(options, file.absent, reading.notes, faults);
   FindRepeats(file, faults);
+  FindUnplaced(path, file, reading.notes, faults);
   if (file.landmarks.empty() && faults.empty()) {
-    faults.emplace_back("there is no landmark; place at least one");
+    faults.push_back(fmt::format("there is no landmark; place at least one{}{}",
+                                 reading.notes.empty() ? "" : "; ",
+                                 fmt::join(reading.notes, "; ")));
   }
   ThrowFaults(path, faults);
   CheckLandmarks(file.landmarks, path.string());
@@ -209,6 +239,9 @@ LandmarkReading ReadLandmarks(const fs::path& path, const ReadLandmarksOptions& 
     return ReadForeign(path, format, options);
   }
   LandmarkReading reading{.file = ReadLandmarkFileAsWritten(path), .notes = {}};
+  std::vector<std::string> faults;
+  FindUnplaced(path, reading.file, reading.notes, faults);
+  ThrowFaults(path, faults);
   ChooseAxes(path, options, reading.file, reading.notes);
   reading.file = InLpsMm(std::move(reading.file));
   CheckReach(path, reading.file);

@@ -62,11 +62,6 @@ void CheckFinite(const LandmarkFile& file) {
   }
 }
 
-void ReadTable(std::string_view bytes) {
-  std::vector<std::string> ignored;
-  CheckFinite(semblance::problems::ParseLandmarkTable(bytes, "fuzz", ignored));
-}
-
 void ReadCondition(std::string_view bytes) {
   const std::vector<std::string> names = {"subject", "interp", "implicit.resolution"};
   const semblance::problems::ValueFilter filter(bytes, names);
@@ -74,6 +69,7 @@ void ReadCondition(std::string_view bytes) {
 }
 
 void Read(char kind, std::string_view bytes) {
+  std::vector<std::string> notes;
   switch (kind) {
     case 'c':
       return ReadPoints(bytes);
@@ -82,15 +78,15 @@ void Read(char kind, std::string_view bytes) {
     case 'h':
       return ReadSurface(bytes);
     case 'f':
-      return CheckFinite(semblance::problems::ParseFcsv(bytes, "fuzz"));
+      return CheckFinite(semblance::problems::ParseFcsv(bytes, "fuzz", notes));
     case 'm':
-      return CheckFinite(semblance::problems::ParseMarkupsJson(bytes, "fuzz"));
+      return CheckFinite(semblance::problems::ParseMarkupsJson(bytes, "fuzz", notes));
     case 'p':
       return CheckFinite(semblance::problems::ParseMeshLabPoints(bytes, "fuzz"));
     case 't':
       return CheckFinite(semblance::problems::ParsePointList(bytes, "fuzz"));
     case 'l':
-      return ReadTable(bytes);
+      return CheckFinite(semblance::problems::ParseLandmarkTable(bytes, "fuzz", notes));
     default:
       return ReadCondition(bytes);
   }

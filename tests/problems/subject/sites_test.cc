@@ -107,6 +107,53 @@ TEST(FindSiteByName, AcceptsTheSideBeforeOrAfterInAnyCase) {
   EXPECT_EQ(FindSiteByName("rhinion").code, "rhi");
 }
 
+// Caple and Stephan (2016) write the side behind the code without a sign.
+TEST(FindSiteByName, AcceptsTheSideDirectlyAfterTheCodeOfAPair) {
+  for (const Site& site : AllSites()) {
+    if (site.side != Side::kMidline) {
+      const char* const side = site.side == Side::kLeft ? "L" : "R";
+      EXPECT_EQ(FindSiteByName(site.landmark + side).code, site.code);
+    }
+  }
+  EXPECT_EQ(FindSiteByName("mr").code, "") << "the code of a pair, and no right side of 'm'";
+  EXPECT_THAT(FindSiteByName("sgL").fault, HasSubstr("'sgl_l' or 'sgl_r'"));
+  EXPECT_EQ(FindSiteByName("gR").code, "") << "in the midline";
+  EXPECT_EQ(FindSiteByName("gonionL").code, "") << "only a code";
+}
+
+// The bone's point of the second molar has one name for both jaws, with an index above or below the
+// line that many programs lose.
+TEST(FindSiteByName, TakesTheMolarsPointOfBothJaws) {
+  EXPECT_EQ(FindSiteByName("ecm\u00b2R").code, "sM2_r");
+  EXPECT_EQ(FindSiteByName("ecm\u2082L").code, "iM2_l");
+  EXPECT_EQ(FindSiteByName("sM\u00b2L").code, "sM2_l");
+  EXPECT_EQ(FindSiteByName("ecm\u00b2R").note, "");
+  EXPECT_EQ(FindSiteByName("ecm2 R").code, "sM2_r");
+  EXPECT_THAT(FindSiteByName("ecm2R").note, HasSubstr("name the point of the lower jaw iM2"));
+}
+
+TEST(FindSiteByName, APointOnTheSkinIsNoSite) {
+  for (const char* name : {"n'", "N`", "n\u00b4", "n\u2019", "n\u2032", "n\u02b9", "n\uff07", "n''",
+                           "n\"", "go'R", "goR'", "left gonion\u2019", "soft tissue nasion",
+                           "Soft-tissue pogonion", "skin n", "n (cutaneous)"}) {
+    EXPECT_EQ(FindSiteByName(name).code, "") << name;
+    EXPECT_THAT(FindSiteByName(name).fault, HasSubstr("names a point on the skin")) << name;
+  }
+  for (const char* name : {"'n'", "\"n\"", "'n"}) {
+    EXPECT_EQ(FindSiteByName(name).code, "n") << name << " is quoted";
+  }
+}
+
+// Signs that are no separators belong to the name: the point may be another one, or doubtful.
+TEST(FindSiteByName, DoesNotPassOverOtherSigns) {
+  for (const char* name : {"n?", "n*", "g\u00f6", "n\u0301", "n+", "\u03b1n", "n~"}) {
+    EXPECT_THAT(FindSiteByName(name).fault, HasSubstr("is not a site")) << name;
+  }
+  for (const char* name : {"go\u2013l", "go\u00a0l", "go, left", "Go [L]", "go/l"}) {
+    EXPECT_EQ(FindSiteByName(name).code, "go_l") << name;
+  }
+}
+
 TEST(FindSiteByName, StatesTheFault) {
   EXPECT_THAT(FindSiteByName("gonion").fault, HasSubstr("is on both sides"));
   EXPECT_THAT(FindSiteByName("18").fault, HasSubstr("'go_l' or 'go_r'"));

@@ -5,6 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <iterator>
+#include <map>
+
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -176,7 +180,7 @@ TEST_F(LandmarkReadingTest, SlicersPointsThatAreNotPlacedAreAbsent) {
                                  HasSubstr("must be [x, y, z]")));
   }
   EXPECT_THAT(Fault("a.mrk.json", markups(R"("positionStatus": "gone")")),
-              HasSubstr("point 2 'g': 'positionStatus' is 'gone'; it must be defined, undefined"));
+              HasSubstr("point 2 'g': the position status is 'gone'; it must be defined (2)"));
 }
 
 TEST_F(LandmarkReadingTest, RequestedAxesMustAgreeWithYaml) {
@@ -261,7 +265,7 @@ TEST_F(LandmarkReadingTest, ListsOfCloudCompare) {
 
 TEST_F(LandmarkReadingTest, TablesWithCommasOrSemicolons) {
   const LandmarkReading reading = Read(
-      "a.csv", "Label;Y;X;Z;Author;depth_along_normal_mm\ng;2,5;1,25;-3;ab;4,5\nn;0;0;0;ab;\n");
+      "a.csv", "Label;Y;X;Z;Author;depth_along_normal_mm\ng;2,5;1,25;-3;ab;4,5\nn;1;0;0;ab;\n");
   EXPECT_EQ(reading.file.landmarks.at(0).point, (std::array{1.25, 2.5, -3.0}));
   EXPECT_EQ(reading.file.landmarks.at(0).depth_along_normal_mm, 4.5);
   EXPECT_EQ(reading.file.landmarks.at(1).depth_along_normal_mm, std::nullopt);
@@ -318,12 +322,186 @@ TEST_F(LandmarkReadingTest, NamesAllFaultsAtOnce) {
   EXPECT_THAT(Fault("a.csv", table),
               ::testing::AllOf(HasSubstr("'F-1' is not a site"), HasSubstr("is on both sides"),
                                HasSubstr("site g (Glabella) appears twice")));
-  const LandmarkReading reading = Read("a.csv", "site,x,y,z\nF-1,0,0,0\ng,0,0,0\n",
+  const LandmarkReading reading = Read("a.csv", "site,x,y,z\nF-1,0,0,0\ng,0,0,1\n",
                                        {.axes = Axes::kLps, .leave_out_unknown = true});
   EXPECT_EQ(reading.file.landmarks.size(), 1U);
   EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("left out: 'F-1' is not a site")));
   EXPECT_THAT(Fault("a.csv", "site,x,y,z\n"), HasSubstr("there is no landmark"));
   EXPECT_THAT(Fault("a.stl", ""), HasSubstr("unknown kind of landmark file"));
+}
+
+std::vector<std::string> Sites(const LandmarkFile& file) {
+  std::vector<std::string> sites;
+  std::ranges::transform(file.landmarks, std::back_inserter(sites), &Landmark::site);
+  return sites;
+}
+
+std::vector<std::string> AbsentSites(const LandmarkFile& file) {
+  std::vector<std::string> sites;
+  std::ranges::transform(file.absent, std::back_inserter(sites), &AbsentLandmark::site);
+  return sites;
+}
+
+// Slicer 5.2 and later write the status of a point in a cell that the header does not name.
+TEST_F(LandmarkReadingTest, TheStatusOfAFiducialListDecidesWhetherAPointIsPlaced) {
+  const std::string head =
+      "# CoordinateSystem = LPS\n"
+      "# columns = id,x,y,z,ow,ox,oy,oz,vis,sel,lock,label,desc,associatedNodeID\n";
+  const auto row = [](const char* site, const char* end) {
+    return fmt::format("1,1,2,3,0,0,0,1,1,1,0,{},{}\n", site, end);
+  };
+  const auto file = Read("a.fcsv", head + row("sg", ",") + row("g", ",,") + row("n", ",,0,0") +
+                                       row("rhi", ",,1,0") + row("pr", ",,2,0") +
+                                       row("id", ",,3,0") + row("sm", ",,2"))
+                        .file;
+  EXPECT_THAT(Sites(file), ElementsAre("sg", "g", "pr", "sm"));
+  EXPECT_THAT(AbsentSites(file), ElementsAre("n", "rhi", "id"));
+  EXPECT_EQ(file.absent.back().reason, "marked as missing in Slicer");
+  EXPECT_THAT(Fault("a.fcsv", head + row("n", ",,7,0")),
+              HasSubstr("a.fcsv:3: the position status is '7'; it must be defined (2)"));
+  EXPECT_THAT(Fault("a.fcsv", head + row("n", "a, b, c,,2,0")),
+              HasSubstr("a.fcsv:3: 18 cells, where the header names 14"));
+  EXPECT_THAT(Fault("a.fcsv", head + "# CoordinateSystem = RAS\n" + row("n", ",")),
+              HasSubstr("a.fcsv:3: a second coordinate system"));
+}
+
+TEST_F(LandmarkReadingTest, AListOfSlicer3TakesTheRequestedAxes) {
+  const std::string list = "# Fiducial List file\n# columns = label,x,y,z,sel,vis\nn,1,2,3,1,1\n";
+  EXPECT_EQ(Read("a.fcsv", list, {.axes = Axes::kRas}).file.landmarks.at(0).point,
+            (std::array{-1.0, -2.0, 3.0}));
+  EXPECT_EQ(Read("a.fcsv", list, {.axes = Axes::kLps}).file.landmarks.at(0).point,
+            (std::array{1.0, 2.0, 3.0}));
+  EXPECT_THAT(Fault("a.fcsv", list), HasSubstr("or convert it with --axes"));
+}
+
+TEST_F(LandmarkReadingTest, HiddenPointsCountAndAreNoted) {
+  const LandmarkReading list =
+      Read("a.fcsv",
+           "# CoordinateSystem = LPS\n# columns = label,x,y,z,sel,vis\nn,1,2,3,0,1\ng,4,5,6,1,1\n");
+  EXPECT_THAT(list.notes, ElementsAre(HasSubstr("hidden or not selected in Slicer, and read all "
+                                                "the same: n; delete points")));
+  const LandmarkReading markups = Read("a.mrk.json", R"({"markups": [{"coordinateSystem": "LPS",
+      "controlPoints": [{"label": "n", "position": [1, 2, 3], "visibility": false}]}]})");
+  EXPECT_THAT(markups.notes, ElementsAre(HasSubstr("the same: n;")));
+  EXPECT_THAT(Read("a.csv", "label,l,p,s,selected,visible,locked\nn,1,2,3,1,0,1\n").notes,
+              ElementsAre(HasSubstr("the same: n;")));
+}
+
+// The points of curves and lines are named after their list, as R-11, which would be a site.
+TEST_F(LandmarkReadingTest, OnlyMarkupsOfPointsAreLandmarks) {
+  const auto markups = [](const char* type) {
+    return fmt::format(R"({{"markups": [{{"type": "{}", "coordinateSystem": "RAS",
+        "controlPoints": [{{"label": "R-11", "position": [1, 2, 3]}}]}},
+        {{"type": "Fiducial", "coordinateSystem": "LPS",
+        "controlPoints": [{{"label": "n", "position": [4, 5, 6]}}]}}]}})",
+                       type);
+  };
+  for (const char* type : {"Line", "Angle", "Curve", "ClosedCurve", "Plane", "ROI"}) {
+    const LandmarkReading reading = Read("a.mrk.json", markups(type));
+    EXPECT_THAT(Sites(reading.file), ElementsAre("n"));
+    EXPECT_THAT(reading.notes,
+                ElementsAre(HasSubstr(fmt::format(
+                    "left out a markup of type {} with 1 points (R-11); only the points", type))));
+  }
+  EXPECT_THAT(Fault("a.mrk.json", R"({"markups": [{"type": "Curve", "controlPoints": []}]})"),
+              HasSubstr("there is no landmark; place at least one; "));
+}
+
+TEST_F(LandmarkReadingTest, ATableStatesItsAxesAndWhichPointsAreDefined) {
+  const LandmarkReading lps = Read("a.csv",
+                                   "label,l,p,s,defined,selected,visible,locked,description\n"
+                                   "g,1,2,3,1,1,1,0,worn\nn,0,0,0,0,1,1,0,\npr,,,,0,1,1,0,\n");
+  EXPECT_EQ(lps.file.landmarks.at(0).point, (std::array{1.0, 2.0, 3.0}));
+  EXPECT_EQ(lps.file.landmarks[0].note, "worn");
+  EXPECT_THAT(AbsentSites(lps.file), ElementsAre("n", "pr"));
+  EXPECT_EQ(lps.file.absent[0].reason, "defined is 0 in the table");
+  EXPECT_THAT(lps.notes, IsEmpty());
+  const LandmarkReading ras = Read("a.csv", "label,R,A,S,missing\ng,1,2,3,\nn,4,5,6,yes\n");
+  EXPECT_EQ(ras.file.landmarks.at(0).point, (std::array{-1.0, -2.0, 3.0}));
+  EXPECT_THAT(AbsentSites(ras.file), ElementsAre("n"));
+  EXPECT_THAT(ras.notes, ElementsAre(HasSubstr("turned from RAS to LPS")));
+  EXPECT_THAT(AbsentSites(Read("a.csv", "site,x,y,z,position_status\nn,1,2,3,3\ng,1,2,3,2\n").file),
+              ElementsAre("n"));
+  EXPECT_THAT(Fault("a.csv", "label,l,p,s\ng,1,2,3\n", {.axes = Axes::kRas}),
+              HasSubstr("the file has LPS axes, and RAS was requested"));
+  EXPECT_THAT(Fault("a.csv", "label,l,p,s,x,y,z\ng,1,2,3,1,2,3\n"),
+              HasSubstr("a.csv:1: the columns hold the coordinates twice"));
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z,defined\ng,1,2,3,maybe\n"),
+              HasSubstr("a.csv:2: column 'defined': 'maybe' is neither 0 nor 1"));
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z,position_status\ng,1,2,3,9\n"),
+              HasSubstr("a.csv:2: the position status is '9'"));
+}
+
+TEST_F(LandmarkReadingTest, TablesWithTabsAndWithEmptyRows) {
+  const auto tabs = Read("a.csv", "site\tx\ty\tz\tnote\nn\t1\t2\t3\t\"a\tb\"\n\t\t\t\t\n").file;
+  EXPECT_EQ(tabs.landmarks.at(0).point, (std::array{1.0, 2.0, 3.0}));
+  EXPECT_EQ(tabs.landmarks[0].note, "a\tb");
+  EXPECT_EQ(Read("a.csv", "site\tx\ty\tz\nn\t1,5\t2\t3\n").file.landmarks.at(0).point,
+            (std::array{1.5, 2.0, 3.0}));
+  EXPECT_EQ(Sites(Read("a.csv", "site,x,y,z\nn,1,2,3\n,,,\n\n,,,\n").file).size(), 1U);
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z\nn,1,2,3\n,,,\ng,1,,3\n"),
+              HasSubstr("a.csv:4: column 'y': ''"));
+}
+
+TEST_F(LandmarkReadingTest, PointsAtTheOriginWereNeverPlaced) {
+  EXPECT_THAT(Fault("a.csv", "site,x,y,z\nn,0,0,0\ng,0,0,0\nsg,1,2,3\n"),
+              HasSubstr("sites n, g are at the same point 0, 0, 0, so they were never placed"));
+  EXPECT_THAT(
+      Fault("a.yaml", "landmarks: [{site: g, point: [0, 0, 0]}, {site: n, point: [0, 0, 0.0]}]\n"),
+      HasSubstr("sites g, n are at the same point"));
+  EXPECT_THAT(Read("a.yaml", "landmarks: [{site: g, point: [0, 0, 0]}]\n").notes,
+              ElementsAre("a.yaml: site g is at 0, 0, 0; check that it was placed"));
+}
+
+TEST_F(LandmarkReadingTest, APointOnTheSkinIsNotTakenForTheBone) {
+  for (const char* name : {"n'", "n\u2019", "n\u2032", "soft tissue nasion", "n (skin)"}) {
+    EXPECT_THAT(Fault("a.csv", fmt::format("site,x,y,z\n{},1,2,3\n", name)),
+                HasSubstr("names a point on the skin"))
+        << name;
+  }
+  const LandmarkReading reading = Read("a.csv", "site,x,y,z\nn',1,2,3\ng,1,2,3\n",
+                                       {.axes = Axes::kLps, .leave_out_unknown = true});
+  EXPECT_THAT(Sites(reading.file), ElementsAre("g"));
+  EXPECT_THAT(reading.notes, ElementsAre(HasSubstr("left out: 'n'' names a point on the skin")));
+}
+
+// The inputs that failed in the field, each with its right points.
+class FieldLandmarks : public LandmarkReadingTest {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(kField)) {
+      GTEST_SKIP() << "the inputs of the field are not here";
+    }
+  }
+  // Checks the sites with their points, and those that are listed as absent.
+  void ExpectSites(const LandmarkReading& reading, const std::vector<std::string>& sites,
+                   const std::vector<std::string>& absent) {
+    const std::map<std::string, std::array<double, 3>> points = {
+        {"sg", {132.2, 36.4, 150.7}},  {"g", {131.8, 32.7, 140.3}}, {"n", {131.2, 36.6, 129.4}},
+        {"rhi", {131.2, 24.6, 114.2}}, {"mp", {128.1, 41.2, 63.5}}, {"pr", {127.8, 40, 58}}};
+    EXPECT_EQ(Sites(reading.file), sites);
+    EXPECT_EQ(AbsentSites(reading.file), absent);
+    for (const Landmark& landmark : reading.file.landmarks) {
+      EXPECT_EQ(landmark.point, points.at(landmark.site)) << landmark.site;
+    }
+  }
+  const std::filesystem::path kField = SEMBLANCE_SOURCE_DIR "/../shared/data/field";
+  const std::vector<std::string> kAll = {"sg", "g", "n", "rhi", "mp", "pr"};
+  const std::vector<std::string> kWithoutMp = {"sg", "g", "n", "rhi", "pr"};
+};
+
+TEST_F(FieldLandmarks, HaveTheirRightPoints) {
+  ExpectSites(ReadLandmarks(kField / "status.fcsv"), {"sg", "g", "rhi", "pr"}, {"n", "mp"});
+  ExpectSites(ReadLandmarks(kField / "defined-column.csv"), kWithoutMp, {"mp"});
+  ExpectSites(ReadLandmarks(kField / "slicer-table.csv"), kWithoutMp, {"mp"});
+  ExpectSites(ReadLandmarks(kField / "slicer3.fcsv", {.axes = Axes::kRas}), kAll, {});
+  ExpectSites(ReadLandmarks(kField / "line-beside.mrk.json"), kAll, {});
+  ExpectSites(ReadLandmarks(kField / "tabs.csv"), kAll, {});
+  ExpectSites(ReadLandmarks(kField / "empty-rows.csv"), kAll, {});
+  EXPECT_THAT(Sites(ReadLandmarks(kField / "standard-names.csv").file),
+              ElementsAre("g", "n", "go_r", "go_l", "zy_r", "zy_l", "mso_r", "mso_l", "sM2_r"));
+  EXPECT_THAT(ReadLandmarks(kField / "standard-names.csv").notes,
+              ::testing::Contains(HasSubstr("'ecm2R' is taken for sM2_r")));
 }
 
 }  // namespace
