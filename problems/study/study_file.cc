@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <boost/random/sobol.hpp>
 #include <cmath>
+#include <iterator>
 #include <optional>
+#include <set>
 #include <string>
+#include <utility>
 
 #include "problems/config/config.h"
 #include "problems/config/config_reader.h"
@@ -170,6 +173,41 @@ double TrialCount(const StudyFile& study) {
   return study.sample ? count * study.sample->n : count;
 }
 
+// Two settings of one row: `later` is applied after `earlier`. Both paths are canonical.
+bool SetTheSame(const std::string& earlier_path, const ConfigNode& earlier,
+                const std::string& later_path, const ConfigNode& later) {
+  if (SetsEntry(earlier_path, earlier, later_path)) {
+    return true;
+  }
+  // A whole value that is not merged drops what was set within it before.
+  const bool replaces = !later.IsMap() || later.Find("type") != nullptr;
+  return SetsEntry(later_path, replaces ? ConfigNode() : later, earlier_path);
+}
+
+// Adds an error for each setting that sets an option which another one of its row has set, also by
+// a path above or below, or by another spelling of the path.
+void RefuseSameOptions(const std::vector<StudyRow>& rows, ConfigErrors& errors) {
+  std::set<std::pair<std::string, std::string>> refused;
+  for (const StudyRow& row : rows) {
+    std::vector<std::string> paths;
+    try {
+      std::ranges::transform(row, std::back_inserter(paths), CanonicalPath, &OptionSetting::key);
+    } catch (const ConfigError&) {
+      return;  // ApplySetting reports a malformed path
+    }
+    for (std::size_t b = 0; b < row.size(); ++b) {
+      for (std::size_t a = 0; a < b; ++a) {
+        if (SetTheSame(paths[a], row[a].value, paths[b], row[b].value) &&
+            refused.emplace(row[a].key, row[b].key).second) {
+          errors.Add(row[b].key_location, row[b].key,
+                     fmt::format("sets the same option as '{}' in line {}; take one of them out",
+                                 row[a].key, row[a].key_location.line));
+        }
+      }
+    }
+  }
+}
+
 }  // namespace
 
 StudyFile ReadStudyFile(const std::filesystem::path& file, ConfigNode& tree, ConfigErrors& errors) {
@@ -196,8 +234,11 @@ std::string ComplaintAboutSize(const StudyFile& study) {
 }
 
 std::vector<StudyRow> MakeStudyRows(const StudyFile& study, ConfigErrors& errors) {
-  return Product(Product(GridRows(study.grid), ZipRows(study.zip, errors)),
-                 Product(ListRows(study.list), SampleRows(study.sample, errors)));
+  std::vector<StudyRow> rows =
+      Product(Product(GridRows(study.grid), ZipRows(study.zip, errors)),
+              Product(ListRows(study.list), SampleRows(study.sample, errors)));
+  RefuseSameOptions(rows, errors);
+  return rows;
 }
 
 void ApplySetting(const OptionSetting& setting, const ConfigNode& defaults, ConfigNode& tree,

@@ -69,6 +69,46 @@ TEST_F(StudyPlanTest, EveryCombinationIsOneTrial) {
                            .hash);
 }
 
+// The second value of an option would win, and the table would still show the first.
+TEST_F(StudyPlanTest, AnOptionThatARowSetsTwiceIsRefused) {
+  struct Twice {
+    std::string text, place;
+  };
+  const std::vector<Twice> cases = {
+      {"grid: {interp: [nearest, mean]}\nzip: {interp: [nearest, mean]}\n",
+       ":5:7: interp: sets the same option as 'interp' in line 4; take one of them out"},
+      {"grid: {rounds: [1, 2]}\nlist: [{rounds: 3}]\n", ":5:9: rounds: sets the same option"},
+      {"grid: {seeds.level: [0, 1]}\nsample: {n: 2, ranges: {seeds.level: [0, 3]}}\n",
+       ":5:25: seeds.level: sets the same option"},
+      {"grid: {interp: [nearest, mean], interp.type: [mean, nearest]}\n",
+       ":4:33: interp.type: sets the same option as 'interp'"},
+      {"grid: {seeds: [{level: 0}, {weight: 2}], seeds.weight: [1, 3]}\n",
+       ":4:42: seeds.weight: sets the same option as 'seeds'"},
+      {"grid: {seeds.weight: [1, 3], seeds: [{level: 0}, {weight: 2}]}\n",
+       ":4:30: seeds: sets the same option as 'seeds.weight'"},
+      {"grid: {interp.power: [1, 2], interp: [nearest, mean]}\n",
+       ":4:30: interp: sets the same option as 'interp.power'"},
+      {"grid: {'fit.plan.schedule[0].fraction': [0.5, 1], 'fit.plan.schedule[00].fraction': [1]}\n",
+       ":4:51: fit.plan.schedule[00].fraction: sets the same option"}};
+  for (const Twice& twice : cases) {
+    EXPECT_THAT(Faults(twice.text), HasSubstr(twice.place)) << twice.text;
+  }
+  // Different options of one strategy are no conflict, nor are rows of a list.
+  EXPECT_EQ(Plan("grid: {seeds: [{level: 0}, {level: 1}], seeds.weight: [1, 3]}\n").trials.size(),
+            4u);
+  EXPECT_EQ(Plan("list: [{rounds: 1}, {rounds: 2}]\n").trials.size(), 2u);
+}
+
+TEST_F(StudyPlanTest, NamesThatAreTheSameInUnicodeAreTheSameSubject) {
+  EXPECT_THAT(Faults("subjects: [{name: \"M\u00fcller\"}, {name: \"Mu\u0308ller\"}]\n"),
+              HasSubstr("appears twice"));
+  const StudyPlan plan = Plan(
+      "subjects: [{name: \"Mu\u0308ller\"}, {name: b, set: "
+      "{subject.random_seed: 7}}]\n");
+  EXPECT_EQ(plan.trials[0].subject, "M\u00fcller");
+  EXPECT_THAT(SelectTrials(plan, "subject = 'Mu\u0308ller'"), ElementsAre(true, false));
+}
+
 TEST_F(StudyPlanTest, TrialsAreCountedBeforeTheyAreMade) {
   std::string values = "[1";
   for (int k = 2; k <= 500; ++k) {
