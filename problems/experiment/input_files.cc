@@ -14,6 +14,7 @@
 #include "problems/experiment/case.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/extra_dowels.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/experiment/make_face.h"
 #include "problems/face/bust/bust_model.h"
 #include "problems/face/edit_script.h"
@@ -68,7 +69,7 @@ bool UsesAllLandmarks(const Experiment& experiment) {
 // Checks each file by itself, because a loader stops at the first faulty file.
 void CheckParts(const FileSubject& subject, CheckFindings& findings) {
   for (const fs::path& mesh : {subject.skull, subject.skin, subject.mandible.mesh}) {
-    Try(findings, [&] { mesh.empty() ? TriMesh() : ReadMesh(mesh); });
+    Try(findings, [&] { mesh.empty() ? MeshFile() : ReadMeshFile(mesh); });
   }
   Try(findings, [&] { ReadLandmarks(subject.landmarks); });
 }
@@ -156,7 +157,7 @@ bool NamesAFile(const Experiment& experiment) {
 
 std::vector<NamedFile> NamedInputs(const Experiment& experiment) {
   std::vector<NamedFile> files = NamedFiles(experiment);
-  if (TissueTableFiles(experiment.tissue).empty()) {
+  if (TissueTableFiles(experiment.tissue).empty() && !NeedsExpected(experiment.interp)) {
     std::erase_if(files,
                   [](const NamedFile& named) { return named.option.starts_with("tissue."); });
   }
@@ -173,10 +174,10 @@ std::vector<std::filesystem::path> InputFiles(const Experiment& experiment) {
 
 GivenFiles GivenTo(const Experiment& experiment, const std::filesystem::path& config,
                    std::span<const std::string_view> outputs) {
-  GivenFiles given{.files = InputFiles(experiment), .outputs = outputs};
-  given.files.push_back(config);
-  // The modes of a prior may be a folder, of which each mesh is read.
-  std::ranges::copy(PriorFiles(experiment.prior), std::back_inserter(given.files));
+  GivenFiles given{.files = {config}, .outputs = outputs};
+  for (const NamedFile& input : NamedInputs(experiment)) {
+    std::ranges::copy(ListParts(input), std::back_inserter(given.files));
+  }
   return given;
 }
 

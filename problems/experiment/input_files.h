@@ -20,7 +20,8 @@
 namespace semblance::problems {
 
 // The files that an experiment reads, each with the option that names it, in the order of the
-// options. A table that no depth is taken from (`depths: measured`) is left out.
+// options. A table that no depth is taken from (`depths: measured`, and a scheme that needs no mean
+// depths) is left out.
 std::vector<NamedFile> NamedInputs(const Experiment& experiment);
 
 // The same files without the options.

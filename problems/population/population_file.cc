@@ -10,8 +10,8 @@
 
 #include "problems/config/config.h"
 #include "problems/config/spelling_suggestion.h"
-#include "problems/io/file_hashes.h"
-#include "problems/io/manifest.h"
+#include "problems/config/utf8_check.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
@@ -31,26 +31,11 @@ bool IsMissing(const PopulationSubject& subject) {
   return std::ranges::any_of(files, [](const NamedFile& named) { return !fs::exists(named.file); });
 }
 
-// The files of a path; a folder stands for the files of its volume.
-std::vector<fs::path> ListFiles(const fs::path& path) {
-  return fs::is_directory(path) ? VolumeFiles(path) : std::vector{path};
-}
-
-// The options as text, in which the hash of a file's content replaces its path.
+// The options as text, in which the contents of files replace their paths.
 template <class Options>
 std::string Fingerprint(const Options& options, FileHashes& hashes) {
-  std::string text = ToFlowYaml(MakeConfigTree(options));
-  for (const NamedFile& named : NamedFiles(options)) {
-    std::string content;
-    for (const fs::path& part : ListFiles(named.file)) {
-      content += hashes.Of(part);
-    }
-    const std::string name = named.file.string();
-    for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at)) {
-      text.replace(at, name.size(), content);
-    }
-  }
-  return text;
+  return ToFlowYaml(WithInputs(MakeConfigTree(options), NamedFiles(options),
+                               [&](const NamedFile& input) { return HashContent(input, hashes); }));
 }
 
 // Removes the fields that do not affect the measurement, so that a change of them keeps the id.
@@ -77,7 +62,7 @@ std::vector<PopulationSubject> Phantoms(const PhantomCrowd& crowd) {
 void CheckNames(const std::vector<PopulationEntry>& entries) {
   std::set<std::string> names;
   for (const PopulationEntry& entry : entries) {
-    if (entry.subject.name.empty() || !names.insert(entry.subject.name).second) {
+    if (entry.subject.name.empty() || !names.insert(Normalized(entry.subject.name)).second) {
       throw InputError(fmt::format(
           "subjects: the name '{}' is empty or appears twice; each subject needs one of its own",
           entry.subject.name));

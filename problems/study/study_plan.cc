@@ -9,13 +9,15 @@
 #include <map>
 #include <set>
 #include <sstream>
+#include <utility>
 
 #include "problems/config/config_reader.h"
+#include "problems/config/terminal_text.h"
+#include "problems/config/utf8_check.h"
 #include "problems/config/value_filter.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/experiment/input_files.h"
-#include "problems/io/file_hashes.h"
-#include "problems/io/manifest.h"
 #include "problems/study/study_metrics.h"
 #include "surfaces/base/encoding.h"
 
@@ -36,7 +38,7 @@ struct SubjectTree {
 std::string Label(const ConfigNode& value) {
   const ConfigNode* type = value.IsMap() ? value.Find("type") : nullptr;
   if (!type) {
-    return value.IsScalar() ? value.text : ToFlowYaml(value);
+    return value.IsScalar() ? PlainText(Normalized(value.text)) : ToFlowYaml(value);
   }
   std::string label = type->text;
   for (const ConfigNode::Entry& entry : value.entries) {
@@ -101,41 +103,23 @@ StudyTrial MakeTrial(const SubjectTree& subject, const StudyRow& row,
   return trial;
 }
 
-// Hashes resolved experiments. Each input file enters with its content instead of its path, so that
-// the hash is the same on every machine.
-class ExperimentHash {
- public:
-  std::string operator()(const Experiment& experiment) {
-    std::string text = WriteConfig(experiment);
-    for (const fs::path& file : InputFiles(experiment)) {
-      const std::string name = file.string(), hash = "sha256:" + HashFile(file);
-      for (std::size_t at = text.find(name); at != text.npos; at = text.find(name, at)) {
-        text.replace(at, name.size(), hash);
-      }
-    }
-    return Shorten(text);
-  }
+std::string ShortHash(const std::string& text) {
+  constexpr std::size_t kDigits = 12;  // 48 bits: 100,000 trials collide with a chance of 2e-5
+  return Sha256OfText(text).substr(0, kDigits);
+}
 
-  static std::string Shorten(const std::string& text) {
-    constexpr std::size_t kDigits = 12;  // 48 bits: 100,000 trials collide with a chance of 2e-5
-    return Sha256OfText(text).substr(0, kDigits);
-  }
-
- private:
-  // The hash of a folder (a DICOM series) is the hash of the hashes of its files.
-  std::string HashFile(const fs::path& file) {
-    if (!fs::is_directory(file)) {
-      return files_.Of(file);
-    }
-    std::string all;
-    for (const fs::path& part : VolumeFiles(file)) {
-      all += files_.Of(part);
-    }
-    return Sha256OfText(all);
-  }
-
-  FileHashes files_;
-};
+// Hashes a resolved experiment with the contents of its input files, so that the hash is the same
+// on every machine. Each content is hashed once.
+std::string HashExperiment(const Experiment& experiment, InputContents& contents) {
+  return ShortHash(ToFlowYaml(
+      WithInputs(MakeConfigTree(experiment), NamedFiles(experiment), [&](const NamedFile& input) {
+        const auto [known, is_new] = contents.by_input.try_emplace({input.option, input.file});
+        if (is_new) {
+          known->second = HashContent(input, *contents.hashes);
+        }
+        return known->second;
+      })));
+}
 
 // Reads the trees of the experiments that a study file names, and edits them as it says. Adds
 // faults to `errors`.
@@ -176,7 +160,7 @@ class SubjectReader {
       }
       Apply(study_.set, tree);
       Apply(list[n].set, tree);
-      trees.push_back({list[n].name, std::move(tree), list[n].optional, list[n].tags});
+      trees.push_back({PlainText(list[n].name), std::move(tree), list[n].optional, list[n].tags});
     }
     return trees;
   }
@@ -252,10 +236,16 @@ std::vector<std::string> CollectAxes(const std::vector<StudyRow>& rows) {
 
 std::set<std::string> MissingFiles(const std::vector<StudyTrial>& trials) {
   std::set<std::string> missing;
+  std::set<fs::path> known;  // trials share most inputs
   for (const StudyTrial& trial : trials) {
-    for (const fs::path& file : InputFiles(trial.experiment)) {
-      if (!fs::exists(file)) {
-        missing.insert(file.string());
+    for (const NamedFile& input : NamedInputs(trial.experiment)) {
+      if (!known.insert(input.file).second) {
+        continue;
+      }
+      for (const fs::path& part : ListParts(input)) {
+        if (!fs::exists(part)) {
+          missing.insert(part.string());
+        }
       }
     }
   }
@@ -264,13 +254,13 @@ std::set<std::string> MissingFiles(const std::vector<StudyTrial>& trials) {
 
 // Describes everything besides the experiment that the results of a trial depend on. Empty for
 // `job: face`.
-std::string CommonPart(const StudyPlan& plan, ExperimentHash& hash) {
+std::string CommonPart(StudyPlan& plan) {
   std::string common = plan.job == StudyJob::kDepth ? "depth" : "";
   if (plan.job == StudyJob::kIdentify) {
     common = fmt::format("identify {} {} {}", plan.identify.ceiling_cell_mm,
                          plan.identify.ceiling_noise_mm, plan.identify.random_seed);
     for (const GalleryEntry& person : plan.gallery) {
-      common += person.name + hash(person.experiment);
+      common += "\n" + person.name + "\n" + HashExperiment(person.experiment, plan.contents);
     }
   }
   return common;
@@ -278,14 +268,13 @@ std::string CommonPart(const StudyPlan& plan, ExperimentHash& hash) {
 
 // Gives each trial its id. Two trials with one id are a fault.
 void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
-  ExperimentHash hash;
-  const std::string common = CommonPart(plan, hash);
+  const std::string common = CommonPart(plan);
   std::map<std::string, std::size_t> first;
   std::string ids;
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     StudyTrial& trial = plan.trials[n];
-    const std::string own = hash(trial.experiment);
-    trial.id = common.empty() ? own : ExperimentHash::Shorten(own + common);
+    const std::string own = HashExperiment(trial.experiment, plan.contents);
+    trial.id = common.empty() ? own : ShortHash(own + common);
     ids += trial.id;
     const auto [it, is_new] = first.emplace(trial.id, n);
     if (!is_new) {
@@ -294,7 +283,7 @@ void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
           file.string(), it->second + 1, n + 1, trial.subject, fmt::join(trial.values, ", ")));
     }
   }
-  plan.hash = ExperimentHash::Shorten(ids + common);
+  plan.hash = ShortHash(ids + common);
 }
 
 void AddTrials(const fs::path& file, const SubjectTree& subject, const std::vector<StudyRow>& rows,
@@ -398,9 +387,11 @@ StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& er
 
 // Makes a plan without axes and trials.
 StudyPlan MakeEmptyPlan(const StudyFile& study) {
-  StudyPlan plan{
-      .title = study.title, .metric = study.metric, .keep = study.keep, .job = study.job};
-  plan.tags = study.tags;
+  StudyPlan plan{.title = PlainText(study.title),
+                 .metric = study.metric,
+                 .keep = study.keep,
+                 .job = study.job};
+  std::ranges::transform(study.tags, std::back_inserter(plan.tags), PlainText);
   return plan;
 }
 

@@ -4,18 +4,21 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "problems/experiment/experiment.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/study/study_file.h"
 
 namespace semblance::problems {
 
 // One trial: the experiment that a subject and a row of settings make.
 struct StudyTrial {
-  // 12 hex digits of a hash over the resolved experiment with its input files by content, over the
-  // job if it is not `face`, and over the gallery if there is one: the same id on every machine.
+  // 12 hex digits of a hash over the resolved experiment with the contents of its input files
+  // (input_contents.h), over the job if it is not `face`, and over the gallery if there is one: the
+  // same id on every machine.
   std::string id;
   std::string subject;              // name in the study
   std::vector<std::string> values;  // one per axis, as short text; empty if the row does not set it
@@ -27,6 +30,12 @@ struct StudyTrial {
 struct GalleryEntry {
   std::string name;
   Experiment experiment;
+};
+
+// The contents of all inputs as the ids of the trials have them, by option and path.
+struct InputContents {
+  InputHashes by_input;
+  std::shared_ptr<FileHashes> hashes = std::make_shared<FileHashes>();
 };
 
 struct StudyPlan {
@@ -41,6 +50,7 @@ struct StudyPlan {
   std::string hash = {};                   // hash of all ids, in order
   IdentifyOptions identify = {};           // options of `job: identify`
   std::vector<GalleryEntry> gallery = {};  // the subjects whose files exist, then the others
+  InputContents contents = {};
 };
 
 // If all subjects are optional and lack files: a fault, or only a note, for `semblance check`.

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
 #include <utility>
 
 #include "problems/face/bust/whole_head.h"
@@ -139,7 +140,9 @@ std::vector<fs::path> BustFiles(const BustSource& source) {
     return {hspline->file};
   }
   if (const auto* mesh = std::get_if<MeshBust>(&source)) {
-    return {mesh->mesh, mesh->landmarks};
+    std::vector<fs::path> files = {mesh->mesh, mesh->landmarks};
+    std::ranges::copy(MaterialFiles(mesh->mesh), std::back_inserter(files));
+    return files;
   }
   return {};
 }

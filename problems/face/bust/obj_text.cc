@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <iterator>
 #include <sstream>
 #include <system_error>
 #include <utility>
@@ -20,8 +21,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<std::string> Lines(const std::string& text) {
+// Lines end as in TextLines, which reads the same bytes, and a byte order mark is skipped.
+std::vector<std::string> Lines(std::string text) {
   std::vector<std::string> lines;
+  if (text.starts_with("\xEF\xBB\xBF")) {
+    text.erase(0, 3);
+  }
+  const std::size_t end = text.find_first_of("\r\n");
+  if (end != std::string::npos && text[end] == '\r' && text.substr(end + 1, 1) != "\n") {
+    std::ranges::replace(text, '\r', '\n');
+  }
   std::istringstream in(text);
   for (std::string line; std::getline(in, line);) {
     if (!line.empty() && line.back() == '\r') {
@@ -32,7 +41,7 @@ std::vector<std::string> Lines(const std::string& text) {
   return lines;
 }
 
-// A line of a material library goes on after a backslash at its end.
+// A line without a comment goes on in the next one after a backslash at its end.
 std::vector<std::string> JoinContinued(const std::vector<std::string>& lines) {
   std::vector<std::string> joined;
   bool continues = false;
@@ -41,7 +50,7 @@ std::vector<std::string> JoinContinued(const std::vector<std::string>& lines) {
       joined.emplace_back();
     }
     joined.back() += line;
-    continues = line.ends_with('\\');
+    continues = line.ends_with('\\') && line.find('#') == line.npos;
     if (continues) {
       joined.back().back() = ' ';
     }
@@ -157,6 +166,7 @@ class LibraryReader {
 
  private:
   void Library(const fs::path& path) {
+    obj_.libraries.push_back(path);
     std::string material;
     for (const std::string& line : JoinContinued(Lines(ReadFileBytes(path)))) {
       const std::vector<std::string> words = Words(line);
@@ -272,12 +282,21 @@ std::string FaceWithoutNormals(const std::vector<std::string>& words) {
 
 ObjText ReadObjText(const fs::path& path) {
   const std::string bytes = ReadFileBytes(path);
-  ObjText obj{ReadObjFile(bytes, path.string()), Lines(bytes), {}, {}, {}};
+  ObjText obj{ReadObjFile(bytes, path.string()), JoinContinued(Lines(bytes)), {}, {}, {}, {}};
   LibraryReader reader(path, obj);
   for (const std::string& library : obj.file.libraries) {
     reader.Read(library);
   }
   return obj;
+}
+
+std::vector<fs::path> MaterialFiles(const fs::path& mesh) {
+  if (LowerCase(mesh.extension().string()) != ".obj") {
+    return {};
+  }
+  ObjText obj = ReadObjText(mesh);
+  std::ranges::transform(obj.textures, std::back_inserter(obj.libraries), &ObjTexture::file);
+  return obj.libraries;
 }
 
 std::string ObjWithPoints(const ObjText& obj, const std::vector<Vec3>& points,

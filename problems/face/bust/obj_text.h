@@ -33,8 +33,9 @@ struct ObjText {
   ObjFile file;
   std::vector<std::string> lines;  // of the file
   std::map<std::string, ObjMaterial> materials;
-  std::vector<MtlLine> mtl;          // the lines of the material libraries
-  std::vector<ObjTexture> textures;  // each file once
+  std::vector<MtlLine> mtl;                      // the lines of the material libraries
+  std::vector<ObjTexture> textures;              // each file once
+  std::vector<std::filesystem::path> libraries;  // files of the material libraries
 };
 
 // Reads a file that ReadMesh has accepted. Names after `mtllib` or `map_` may contain spaces.
@@ -42,6 +43,10 @@ struct ObjText {
 // outside the folder of the OBJ, for a `map_Kd` that is neither PNG nor JPEG, and as ReadObjFile
 // does.
 ObjText ReadObjText(const std::filesystem::path& path);
+
+// The material libraries and textures of a mesh in OBJ; none for a mesh in another form. Throws as
+// ReadObjText does.
+std::vector<std::filesystem::path> MaterialFiles(const std::filesystem::path& mesh);
 
 // The same lines with these points, without normals, and with `bust.mtl` as the only material
 // library. points: as many as the file has. first_material: of faces before the first `usemtl`;

@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <filesystem>
+#include <fstream>
 
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"
@@ -30,16 +31,25 @@ TEST(FileHashes, FollowChangesOfTheFile) {
   }
 }
 
-TEST(FileHashes, AreReusedIfSizeAndTimeAreEqual) {
+// A file of the same size and date is another file.
+TEST(FileHashes, NoticeAChangeThatKeepsSizeAndTime) {
   const testing::ScratchFolder folder;
   const auto file = folder / "skull.ply";
   WriteFileAtomically(file, "one");
   const auto changed = std::filesystem::last_write_time(file);
   FileHashes hashes;
-  hashes.Of(file);
-  WriteFileAtomically(file, "two");
-  std::filesystem::last_write_time(file, changed);
   EXPECT_EQ(hashes.Of(file), Sha256OfText("one"));
+  std::ofstream(file) << "two";
+  std::filesystem::last_write_time(file, changed);
+  EXPECT_EQ(hashes.Of(file), Sha256OfText("two"));
+}
+
+TEST(FileHashes, AnOldFileIsReadOnce) {
+  FileHashes hashes;
+  for (int times = 0; times < 3; ++times) {
+    EXPECT_EQ(hashes.Of("/proc/self/exe").size(), 64U);
+  }
+  EXPECT_EQ(hashes.read(), 1);
 }
 
 }  // namespace

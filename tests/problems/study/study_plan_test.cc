@@ -168,6 +168,30 @@ TEST_F(StudyPlanTest, EveryFaultIsReportedOnceWithItsLine) {
               HasSubstr("base: the file of an experiment is missing"));
 }
 
+// Beside this test, that of input_contents.h goes over every option.
+TEST_F(StudyPlanTest, AnIdFollowsTheContentsOfFilesAndNotTheirPaths) {
+  const auto id_in = [&](const std::string& place, const std::string& landmarks) {
+    fs::create_directories(folder_ / place / "ct");
+    WriteFileAtomically(folder_ / place / "ct/1.dcm", "slice");
+    WriteFileAtomically(folder_ / place / "ct_landmarks.yaml", landmarks);
+    WriteFileAtomically(folder_ / place / "network.yaml", "areas");
+    WriteFileAtomically(
+        folder_ / place / "e.yaml",
+        "subject: {type: ct, volume: ct, landmarks: ct_landmarks.yaml}\n"
+        "tissue: {depths: measured, table: not_used.yaml}\nnetwork: network.yaml\n");
+    WriteFileAtomically(folder_ / place / "s.yaml", "base: e.yaml\ngrid: {interp: [nearest]}\n");
+    return ReadStudy(folder_ / place / "s.yaml").trials.at(0).id;
+  };
+  const std::string id = id_in("here", "10 mm");
+  EXPECT_EQ(id_in("another machine", "10 mm"), id);
+  EXPECT_NE(id_in("here", "20 mm"), id);
+  EXPECT_EQ(id_in("here", "10 mm"), id);
+  fs::rename(folder_ / "here/ct", folder_ / "here/scan");
+  WriteFileAtomically(folder_ / "here/e2.yaml", "base: e.yaml\nsubject: {volume: scan}\n");
+  WriteFileAtomically(folder_ / "here/s2.yaml", "base: e2.yaml\ngrid: {interp: [nearest]}\n");
+  EXPECT_EQ(ReadStudy(folder_ / "here/s2.yaml").trials.at(0).id, id) << "only renamed";
+}
+
 TEST_F(StudyPlanTest, ASubjectWithMissingFilesIsSkippedIfOptionalElseAnError) {
   const std::string missing =
       "subjects: [{name: a}, {name: b, set: {subject: {type: files, skull: none.ply, landmarks: "
