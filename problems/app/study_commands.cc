@@ -63,18 +63,30 @@ bool CheckMetric(const StudyResults& results) {
   return has;
 }
 
+void PrintVersions(const StudyResults& results) {
+  for (const std::string& note : VersionNotes(results)) {
+    Tell("note: {}\n", note);
+  }
+}
+
 // Prints the state of a study's folder, and how to continue.
 int PrintStudyState(const StudyResults& results, const fs::path& root) {
   for (const TrialRow& row : results.trials) {
-    if (row.status == "failed" || row.status == "missing") {
+    if (row.status == "failed" || row.status == "missing" || row.status == "damaged") {
       Tell("{}: {} {} | {}{}{}\n", row.status, row.id, row.subject, fmt::join(row.values, " | "),
            row.reason.empty() ? "" : ": ", row.reason);
     }
   }
   Tell("{}", RankingText(results));
-  Tell("{} of {} trials done, {} unusable, {} failed, {} missing\n", results.Count("done"),
+  if (const std::string unusable = UnusableText(results); !unusable.empty()) {
+    Tell("{}\n", unusable);
+  }
+  PrintVersions(results);
+  const int damaged = results.Count("damaged");
+  Tell("{} of {} trials done, {} unusable, {} failed, {} missing{}\n", results.Count("done"),
        results.trials.size(), results.Count("unusable"), results.Count("failed"),
-       results.Count("missing"));
+       results.Count("missing"),
+       damaged > 0 ? fmt::format(", {} damaged; run the study again", damaged) : "");
   if (fs::exists(root / "report.html")) {
     Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
   } else {
@@ -99,6 +111,7 @@ int PrintPartState(const StudyResults& results, const std::vector<bool>& selecte
            row.reason);
     }
   }
+  PrintVersions(results);
   Tell("{} of the {} selected trials done; {} of all {} trials of the study are missing\n", done,
        count, results.Count("missing"), results.trials.size());
   Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
@@ -120,6 +133,9 @@ StudySummary RunWithProgress(const StudyPlan& plan, const fs::path& root, StudyR
 }
 
 void PrintChange(const StudySummary& summary, const fs::path& root) {
+  for (const std::string& line : summary.damaged) {
+    Tell("note: damaged, so the trial ran again: {}\n", line);
+  }
   if (summary.changed) {
     Tell(
         "note: the study has changed since {} was written: {} of the {} trials exist already; {} "
@@ -133,10 +149,11 @@ StudyRunOptions MakeRunOptions(const StudyArguments& a) {
   const Shard shard = ParseShard(a.shard);
   options.shard = shard.index;
   options.shards = shard.count;
-  options.rerun = a.rerun == "failed"     ? Rerun::kFailed
-                  : a.rerun == "unusable" ? Rerun::kUnusable
-                  : a.rerun == "all"      ? Rerun::kAll
-                                          : Rerun::kNothing;
+  options.rerun = a.rerun == "failed"           ? Rerun::kFailed
+                  : a.rerun == "unusable"       ? Rerun::kUnusable
+                  : a.rerun == "other-versions" ? Rerun::kOtherVersions
+                  : a.rerun == "all"            ? Rerun::kAll
+                                                : Rerun::kNothing;
   return options;
 }
 
@@ -181,7 +198,7 @@ int StudyCommand(const StudyArguments& a) {
 int MergeCommand(const StudyArguments& a) {
   const fs::path root = a.files.at(0);
   for (const std::string& line : GatherTrials(root, {a.files.begin() + 1, a.files.end()})) {
-    fmt::print(stderr, "semblance: {}\n", ForTerminal(line));
+    Tell(stderr, "semblance: {}\n", line);
   }
   if (!fs::exists(root / "plan.json")) {
     throw IoError(fmt::format("{}: not the folder of a study; it has no plan.json", root.string()));
@@ -256,8 +273,9 @@ void DeclareStudy(CLI::App& study, CommandLine& line) {
       "and rounds >= 2\"; = != < <= > >=, ~ with * and ?, and, or, not, ( )");
   study
       .add_option("--rerun", a.rerun,
-                  "run finished trials again: failed; unusable (and failed); all")
-      ->check(CLI::IsMember({"failed", "unusable", "all"}));
+                  "run finished trials again: failed; unusable (and failed); other-versions, those "
+                  "that another version or build of the program made; all")
+      ->check(CLI::IsMember({"failed", "unusable", "other-versions", "all"}));
   study.add_flag("--quiet", a.quiet, "do not show progress");
 }
 

@@ -6,8 +6,11 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <set>
 
+#include "problems/config/terminal_text.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/experiment/metrics/face_metrics.h"
 #include "problems/face/bust/bust_files.h"
 #include "problems/io/manifest.h"
@@ -156,9 +159,14 @@ Json Provenance(const Experiment& experiment, const RunResult& result) {
   for (const auto& [name, version] : LibraryVersions()) {
     json["libraries"][name] = version;
   }
+  std::set<std::filesystem::path> known;  // an input may be a part of another one
   for (const std::filesystem::path& input : result.subject.inputs) {
-    json["inputs"].push_back(
-        {{"file", input.filename().string()}, {"sha256", Sha256OfFile(input)}});
+    for (const std::filesystem::path& part : ListParts({.option = "", .file = input})) {
+      if (known.insert(part).second) {
+        json["inputs"].push_back(
+            {{"file", part.filename().string()}, {"sha256", Sha256OfFile(part)}});
+      }
+    }
   }
   return json;
 }
@@ -182,7 +190,7 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
   context.Report("write");
   std::filesystem::remove(folder.Root() / "manifest.json");  // left by an earlier run
   folder.Write("resolved.yaml", WriteConfig(experiment));
-  folder.Write("result.json", ResultJson(experiment, result).dump(2) + "\n");
+  folder.Write("result.json", WithPlainTexts(ResultJson(experiment, result)).dump(2) + "\n");
   folder.Write("dowels.csv", DowelsCsv(result));
   folder.Write("seeds.csv", SeedsCsv(result));
   WriteMeshes(result, folder, context);

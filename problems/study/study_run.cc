@@ -9,11 +9,11 @@
 //                for each trial of this shard that --only selects
 //                                    |
 //                                    v
-//                    is trials/<id>/trial.json whole?  (ReadTrialFile)
+//            is trials/<id>/ sound: the hashes of trial.json and of its files?  (ReadTrial)
 //                      | no                      | yes
 //                      |                         v
-//                      |      does --rerun ask for its status, or does it
-//                      |      lack a file that `keep` asks for now?
+//                      |      does --rerun ask for its status or its version, or
+//                      |      does it lack a file that `keep` asks for now?
 //                      |         | yes                   | no
 //                      v         v                       v
 //                    +-------------+               +-----------+
@@ -35,8 +35,9 @@
 //
 // Invariants:
 //
-//   (1)  A trial exists if and only if its trial.json parses and holds its id. Other files in its
-//        folder do not make it exist.
+//   (1)  A trial exists if and only if its trial.json holds its id and its own hash, and its other
+//        files have the hashes that trial.json lists. A trial that was damaged later does not
+//        exist: it runs again.
 //   (2)  Every file is written under a temporary name and renamed. trial.json is written last. So
 //        a trial that exists has all its files. During a rerun the earlier trial.json stays until
 //        the rename; a merge notices files that differ from it by their hashes.
@@ -45,9 +46,12 @@
 //        trial.json is lost or empty, (1) makes the trial run again.
 //   (4)  The id of a trial is a hash of its job, its resolved experiment and the content of its
 //        input files. A trial on disk is therefore valid for every plan that contains its id: a
-//        changed study keeps the trials that it still has, and no trial becomes invalid.
+//        changed study keeps the trials that it still has, and no trial becomes invalid. The
+//        contents are hashed when the study is read and compared again after each trial, because
+//        a file may change during the work. The program is not part of the id: trials of another
+//        version stay, the tables name them, and --rerun other-versions makes them again.
 //   (5)  trial.json holds no time, host, folder or number of threads. Its bytes depend only on
-//        the trial, on the axes and `keep` of the plan, and on the versions of the program and
+//        the trial, on the axes and `keep` of the plan, and on the program and the versions of
 //        its libraries. Everything else is in timing.json, which trial.json does not list.
 //   (6)  Shard i of n owns the trials k with k % n == i. Shards share no trial, hold no lock, and
 //        never read each other's trials. If two processes nevertheless run the same trial, both
@@ -80,9 +84,8 @@
 #include <thread>
 
 #include "problems/experiment/experiment_config.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/experiment/input_files.h"
-#include "problems/io/file_hashes.h"
-#include "problems/io/manifest.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
 #include "problems/report/scene_json.h"
@@ -92,18 +95,14 @@
 #include "problems/study/study_tables.h"
 #include "problems/study/trial_folder.h"
 #include "surfaces/base/atomic_file.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/parallel.h"
 
 namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
-
-// Returns the status of a trial on disk, or nothing if trial.json is missing or not whole.
-std::optional<std::string> ReadStatus(const fs::path& folder, const std::string& id) {
-  const auto json = ReadTrialFile(folder, id);
-  return json ? std::optional(json->value("status", "failed")) : std::nullopt;
-}
 
 // The first members of trial.json.
 Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
@@ -114,25 +113,33 @@ Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
   return json;
 }
 
-// Adds inputs, configuration and versions. Inputs have their name and hash but no folder, because
-// folders differ between machines.
+// Adds inputs and configuration. Inputs have their name and hash but no folder, because folders
+// differ between machines.
 void AppendProvenance(const StudyTrial& trial, FileHashes& hashes, Json& json) {
-  std::string config = WriteConfig(trial.experiment);
   json["inputs"] = Json::array();
-  for (const fs::path& file : InputFiles(trial.experiment)) {
-    for (const fs::path& part : fs::is_directory(file) ? VolumeFiles(file) : std::vector{file}) {
-      json["inputs"].push_back({{"file", part.filename().string()}, {"sha256", hashes.Of(part)}});
-    }
-    for (std::size_t at = config.find(file.string()); at != config.npos;
-         at = config.find(file.string(), at)) {
-      config.replace(at, file.string().size(), file.filename().string());
+  for (const NamedFile& input : NamedInputs(trial.experiment)) {
+    for (const fs::path& part : ListParts(input)) {
+      json["inputs"].push_back({{"option", input.option},
+                                {"file", part.filename().string()},
+                                {"sha256", hashes.Of(part)}});
     }
   }
-  json["config"] = config;
-  json["version"] = SEMBLANCE_VERSION;
-  json["libraries"] = Json::object();
-  for (const auto& [name, version] : LibraryVersions()) {
-    json["libraries"][name] = version;
+  json["config"] =
+      ToYaml(WithInputs(MakeConfigTree(trial.experiment), NamedFiles(trial.experiment),
+                        [](const NamedFile& input) { return input.file.filename().string(); }));
+}
+
+// The id of a trial has the contents that its inputs had when the study was read. A result of other
+// contents must not get it. Throws IoError if an input has changed since then.
+void RequireSameInputs(const Experiment& experiment, const InputContents& contents) {
+  for (const NamedFile& input : NamedFiles(experiment)) {
+    const auto known = contents.by_input.find({input.option, input.file});
+    if (known != contents.by_input.end() && HashContent(input, *contents.hashes) != known->second) {
+      throw IoError(fmt::format(
+          "{}: {} has changed since the study began; run the study again, which then makes the "
+          "trials of the changed file",
+          input.option, input.file.string()));
+    }
   }
 }
 
@@ -163,11 +170,16 @@ class StudyRunner {
 
   // Runs the queue of this shard.
   void Run() {
-    const std::vector<bool> chosen = SelectTrials(plan_, options_.only);
+    const std::vector<bool> is_selected = SelectTrials(plan_, options_.only);
+    std::vector<const StudyTrial*> chosen;
     for (std::size_t n = 0; n < plan_.trials.size(); ++n) {
-      if (static_cast<int>(n % options_.shards) == options_.shard && chosen[n]) {
-        Queue(plan_.trials[n]);
+      if (static_cast<int>(n % options_.shards) == options_.shard && is_selected[n]) {
+        chosen.push_back(&plan_.trials[n]);
       }
+    }
+    const std::vector<StoredTrial> stored = ReadStored(chosen);
+    for (std::size_t n = 0; n < chosen.size(); ++n) {
+      Queue(*chosen[n], stored[n]);
     }
     std::vector<std::jthread> threads;
     try {
@@ -196,30 +208,44 @@ class StudyRunner {
   const StudySummary& summary() const { return summary_; }
 
  private:
-  void Queue(const StudyTrial& trial) {
+  // Reads the chosen trials that are on disk. With `keep: run` their files hold many bytes, of
+  // which the hashes are compared by several threads.
+  std::vector<StoredTrial> ReadStored(const std::vector<const StudyTrial*>& chosen) const {
+    std::vector<StoredTrial> stored(chosen.size());
+    ParallelFor(
+        chosen.size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())), 1,
+        [&](std::size_t n) { stored[n] = ReadTrial(folder_, chosen[n]->id, TrialCheck::kAll); });
+    return stored;
+  }
+
+  void Queue(const StudyTrial& trial, const StoredTrial& stored) {
     ++summary_.trials;
-    std::optional<Json> stored = ReadTrialFile(folder_, trial.id);
-    if (stored && !MustRerun(stored->value("status", "failed")) && HasKeptFiles(trial, *stored)) {
-      UpdateAxes(trial, *stored);
+    if (!stored.fault.empty()) {
+      summary_.damaged.push_back(fmt::format("trials/{}: {}", trial.id, stored.fault));
+    }
+    if (stored.numbers && !MustRerun(*stored.numbers) &&
+        HasKeptFiles(trial, stored.numbers->status)) {
+      UpdateAxes(trial);
       ++summary_.skipped;
     } else {
       queue_.push_back(&trial);
     }
   }
 
-  bool MustRerun(const std::string& status) const {
+  bool MustRerun(const TrialNumbers& trial) const {
     return options_.rerun == Rerun::kAll ||
-           (status == "failed" && options_.rerun != Rerun::kNothing) ||
-           (status == "unusable" && options_.rerun == Rerun::kUnusable);
+           (options_.rerun == Rerun::kOtherVersions && !IsOfThisProgram(trial)) ||
+           (trial.status == "failed" &&
+            (options_.rerun == Rerun::kFailed || options_.rerun == Rerun::kUnusable)) ||
+           (trial.status == "unusable" && options_.rerun == Rerun::kUnusable);
   }
 
   // Returns true if the trial's folder has the files that `keep` asks for now. `keep` may have
   // asked for fewer files when the trial ran.
-  bool HasKeptFiles(const StudyTrial& trial, const Json& stored) const {
+  bool HasKeptFiles(const StudyTrial& trial, const std::string& status) const {
     const bool is_depth = plan_.job == StudyJob::kDepth;
-    const bool has_none = stored.value("status", "failed") == "failed" ||
-                          (plan_.keep == TrialFiles::kView && is_depth &&
-                           trial.subject != plan_.trials.front().subject);
+    const bool has_none = status == "failed" || (plan_.keep == TrialFiles::kView && is_depth &&
+                                                 trial.subject != plan_.trials.front().subject);
     const char* file = plan_.keep == TrialFiles::kRun    ? "result.json"
                        : plan_.keep == TrialFiles::kView ? (is_depth ? "depth.png" : "scene.json")
                                                          : "trial.json";
@@ -227,16 +253,16 @@ class StudyRunner {
   }
 
   // Replaces the axes of an earlier plan in trial.json by those of this plan.
-  void UpdateAxes(const StudyTrial& trial, Json& stored) const {
-    const Json head = TrialHead(plan_, trial);
+  void UpdateAxes(const StudyTrial& trial) const {
+    Json stored = *ReadTrialFile(folder_, trial.id);
     bool is_changed = false;
-    for (const auto& [key, value] : head.items()) {
+    for (const auto& [key, value] : TrialHead(plan_, trial).items()) {
       is_changed = is_changed || !stored.contains(key) || stored[key] != value;
       stored[key] = value;
     }
     if (is_changed) {
       WriteFileAtomically(WritableTrialFolder(folder_, trial.id) / "trial.json",
-                          stored.dump(1) + "\n");
+                          TrialText(std::move(stored), Maker::kAsBefore));
     }
   }
 
@@ -288,7 +314,11 @@ class StudyRunner {
     } catch (const std::exception& error) {
       Fail(error.what(), json);
     }
-    AppendProvenance(trial, input_hashes_, json);
+    RequireSameInputs(trial.experiment, plan_.contents);
+    for (const GalleryEntry& person : plan_.gallery) {
+      RequireSameInputs(person.experiment, plan_.contents);
+    }
+    AppendProvenance(trial, *plan_.contents.hashes, json);
     OutputFolder output(WritableTrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
     write(output);
     std::vector<std::string> names = output.Written();
@@ -297,7 +327,7 @@ class StudyRunner {
       json["files"] = ListHashes(output.Root(), names);
     }
     // Invariants 2 and 3.
-    output.Write("trial.json", json.dump(1) + "\n",
+    output.Write("trial.json", TrialText(json, Maker::kThisProgram),
                  plan_.keep == TrialFiles::kSummary ? Durability::kUnsynced : Durability::kSynced);
     CountTrial(trial, json);
   }
@@ -412,7 +442,6 @@ class StudyRunner {
   const StudyRunOptions& options_;
   const RunContext& context_;
   StageCache cache_;
-  FileHashes input_hashes_;
   std::vector<const StudyTrial*> queue_;
   std::atomic<std::size_t> next_ = 0;
   std::atomic<bool> broken_flag_ = false;
@@ -502,7 +531,8 @@ std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<
     }
     for (const auto& entry : fs::directory_iterator(other / "trials")) {
       const std::string id = entry.path().filename().string();
-      if (ReadStatus(other, id) && !ReadStatus(folder, id)) {
+      const bool is_there = fs::exists(entry.path() / "trial.json");
+      if (is_there && !ReadTrial(folder, id, TrialCheck::kAll).numbers) {
         if (const std::string fault = CopyTrial(other, folder, id); !fault.empty()) {
           not_taken.push_back(fmt::format("{}: not taken: {}", entry.path().string(), fault));
         }

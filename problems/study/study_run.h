@@ -15,8 +15,9 @@
 
 namespace semblance::problems {
 
-// The finished trials that run again: none; those that failed; also the unusable ones; all.
-enum class Rerun { kNothing, kFailed, kUnusable, kAll };
+// The finished trials that run again: none; those that failed; also the unusable ones; those that
+// another version or build of the program made; all. A damaged trial always runs again.
+enum class Rerun { kNothing, kFailed, kUnusable, kOtherVersions, kAll };
 
 struct StudyRunOptions {
   int jobs = 1;   // number of trials at a time, each on one thread
@@ -35,6 +36,7 @@ struct StudySummary {
   int trials = 0;   // number of selected trials of this shard
   int skipped = 0;  // existed before
   int done = 0, failed = 0;
+  std::vector<std::string> damaged = {};  // trials that ran again for this reason, a line each
   int left_over = 0;     // trials of an earlier plan in this folder that are not in this plan
   bool changed = false;  // the folder held an earlier plan
   // Number of subjects, shells, skulls with their implicit face, and generic faces that were made.
@@ -53,14 +55,15 @@ struct StudySummary {
 //
 // The study may have changed since the last call. A finished trial that is still in the plan is
 // kept (its trial.json then gets the axes of the changed study), unless it lacks files that `keep`
-// asks for now. A trial that is no longer in the plan stays on disk and appears in no table. Throws
-// IoError if the folder cannot be written or holds a plan that shares no trial with this one,
-// InputError as SelectTrials does, and Cancelled on request.
+// asks for now, or a file of it is damaged. A trial that is no longer in the plan stays on disk and
+// appears in no table. Throws IoError if the folder cannot be written or holds a plan that shares
+// no trial with this one, or if an input file changes during the work; InputError as SelectTrials
+// does, and Cancelled on request.
 StudySummary RunStudy(const StudyPlan& plan, const std::filesystem::path& folder,
                       const StudyRunOptions& options, const RunContext& context);
 
-// Copies finished trials from other folders of the same plan, each completely or not at all. Trials
-// that exist in `folder` stay. Returns one line per trial that was not copied, with the reason of
+// Copies finished trials from other folders of the same plan, each completely or not at all. Sound
+// trials in `folder` stay. Returns one line per trial that was not copied, with the reason of
 // CopyTrial. Throws IoError if a folder has another plan.
 std::vector<std::string> GatherTrials(const std::filesystem::path& folder,
                                       const std::vector<std::filesystem::path>& others);

@@ -13,7 +13,6 @@
 #include <thread>
 #include <utility>
 
-#include "problems/study/trial_folder.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
@@ -52,35 +51,35 @@ double ReadWallTime_s(const fs::path& file) {
              : kNaN;
 }
 
-// Returns nothing if the file is missing or is not a whole trial.json.
-std::optional<TrialNumbers> ReadNumbers(const fs::path& file) {
-  std::error_code ignored;
-  try {
-    return fs::exists(file, ignored) ? ReadTrialNumbers(ReadFileBytes(file)) : std::nullopt;
-  } catch (const IoError&) {
-    return std::nullopt;
-  }
+std::string NameOtherMaker(const TrialNumbers& trial) {
+  return IsOfThisProgram(trial)               ? ""
+         : trial.version.empty()              ? "an unknown version"
+         : trial.version == SEMBLANCE_VERSION ? "another build of version " + trial.version
+                                              : "version " + trial.version;
 }
 
-void ReadTrial(const fs::path& folder, TrialRow& row) {
-  row.status = "missing";
-  std::optional<TrialNumbers> trial = ReadNumbers(TrialFolder(folder, row.id) / "trial.json");
-  if (!trial || trial->id != row.id) {
+void ReadTrial(const fs::path& folder, TrialCheck check, TrialRow& row) {
+  StoredTrial stored = ReadTrial(folder, row.id, check);
+  row.status = stored.fault.empty() ? "missing" : "damaged";
+  row.reason = std::move(stored.fault);
+  if (!stored.numbers) {
     return;
   }
-  row.status = std::move(trial->status);
-  row.reason = std::move(trial->reason);
+  TrialNumbers& trial = *stored.numbers;
+  row.made_by_other = NameOtherMaker(trial);
+  row.status = std::move(trial.status);
+  row.reason = std::move(trial.reason);
   row.wall_s = ReadWallTime_s(TrialFolder(folder, row.id) / "timing.json");
-  row.metrics = std::move(trial->metrics);
-  TakeCurves(trial->lists, row);
+  row.metrics = std::move(trial.metrics);
+  TakeCurves(trial.lists, row);
 }
 
 // Reads all trials in parallel: a study has many, and reading them takes most of the time of its
 // tables.
-void ReadTrials(const fs::path& folder, std::vector<TrialRow>& rows) {
+void ReadTrials(const fs::path& folder, TrialCheck check, std::vector<TrialRow>& rows) {
   constexpr std::size_t kBlock = 4;  // trials per task
   ParallelFor(rows.size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())),
-              kBlock, [&](std::size_t n) { ReadTrial(folder, rows[n]); });
+              kBlock, [&](std::size_t n) { ReadTrial(folder, check, rows[n]); });
 }
 
 std::map<std::string, double> BySubject(const StudyResults& results, const Treatment& treatment,
@@ -143,7 +142,7 @@ bool StudyResults::HasMetric() const {
   });
 }
 
-StudyResults ReadStudyResults(const fs::path& folder) {
+StudyResults ReadStudyResults(const fs::path& folder, TrialCheck check) {
   const fs::path file = folder / "plan.json";
   const auto fail = [&file] {
     return IoError(fmt::format(
@@ -164,17 +163,53 @@ StudyResults ReadStudyResults(const fs::path& folder) {
         throw fail();
       }
     }
-    ReadTrials(folder, results.trials);
+    ReadTrials(folder, check, results.trials);
     results.tags = plan.value("tags", std::vector<std::string>());
     results.preference = PreferenceFor(results.metric);
   } catch (const nlohmann::json::exception&) {
     throw fail();
   }
+  std::ranges::copy(VersionNotes(results), std::back_inserter(results.notes));
   std::ranges::copy(AreaNotes(results), std::back_inserter(results.notes));
   if (!results.tags.empty()) {
     results.notes.push_back(fmt::format("tags: {}", fmt::join(results.tags, ", ")));
   }
   return results;
+}
+
+std::vector<std::string> VersionNotes(const StudyResults& results) {
+  std::map<std::string, int> count;
+  for (const TrialRow& row : results.trials) {
+    if (!row.made_by_other.empty()) {
+      ++count[row.made_by_other];
+    }
+  }
+  std::vector<std::string> notes;
+  for (const auto& [maker, trials] : count) {
+    notes.push_back(fmt::format(
+        "{} of {} trials {} made by {}, and this program is version {}; their numbers may differ "
+        "for this reason. `semblance study CONFIG --rerun other-versions` makes them again",
+        trials, results.trials.size(), trials == 1 ? "was" : "were", maker, SEMBLANCE_VERSION));
+  }
+  return notes;
+}
+
+std::string DamageText(const StudyResults& results) {
+  constexpr std::size_t kNamed = 5;
+  std::vector<std::string> named;
+  for (const TrialRow& row : results.trials) {
+    if (row.status == "damaged" && named.size() < kNamed) {
+      named.push_back(fmt::format("trials/{}: {}", row.id, row.reason));
+    }
+  }
+  const auto count = static_cast<std::size_t>(results.Count("damaged"));
+  return named.empty() ? ""
+                       : fmt::format(
+                             "{} of {} trials {} damaged and left out; run the study again, "
+                             "which makes {} again: {}{}",
+                             count, results.trials.size(), count == 1 ? "is" : "are",
+                             count == 1 ? "it" : "them", fmt::join(named, "; "),
+                             count > kNamed ? "; ..." : "");
 }
 
 std::vector<std::string> AreaNotes(const StudyResults& results) {
@@ -229,11 +264,28 @@ std::vector<Treatment> Treatments(const StudyResults& results, const std::string
     if (row.status == "done") {
       treatments[it->second].trials.push_back(n);
     }
+    treatments[it->second].unusable += row.status == "unusable" ? 1 : 0;
   }
   for (Treatment& treatment : treatments) {
     treatment.by_subject = BySubject(results, treatment, metric);
   }
   return treatments;
+}
+
+std::string UnusableText(const StudyResults& results) {
+  std::string by_treatment;
+  for (const Treatment& treatment : Treatments(results, results.metric)) {
+    if (treatment.unusable > 0) {
+      by_treatment += fmt::format("{}{} ({})", by_treatment.empty() ? "" : "; ", treatment.label,
+                                  treatment.unusable);
+    }
+  }
+  return by_treatment.empty()
+             ? ""
+             : fmt::format(
+                   "{} of {} trials not usable and left out of rankings, means and tests: "
+                   "{}. The table of trials has the reasons",
+                   results.Count("unusable"), results.trials.size(), by_treatment);
 }
 
 std::string TrialsCsv(const StudyResults& results) {
@@ -287,7 +339,7 @@ class MetricWalk {
 std::string SummaryCsv(const StudyResults& results) {
   std::vector<std::string> columns = results.axes;
   columns.insert(columns.end(), {"metric", "n", "mean", "sd", "median", "min", "max", "mean_low_95",
-                                 "mean_high_95"});
+                                 "mean_high_95", "unusable"});
   CsvWriter csv(columns);
   const std::vector<Treatment> treatments = Treatments(results, results.metric);
   MetricWalk walk(results);
@@ -299,7 +351,7 @@ std::string SummaryCsv(const StudyResults& results) {
       }
       const SampleSummary s = Summarize(values);
       csv.Row(treatment.values, metric, s.n, s.mean, s.sd, s.median, s.min, s.max, s.mean_95.low,
-              s.mean_95.high);
+              s.mean_95.high, treatment.unusable);
     }
   }
   return csv.Text();

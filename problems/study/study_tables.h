@@ -9,6 +9,7 @@
 
 #include "problems/experiment/metrics/statistics.h"
 #include "problems/study/study_metrics.h"
+#include "problems/study/trial_folder.h"
 #include "surfaces/base/geometry.h"
 
 namespace semblance::problems {
@@ -16,8 +17,8 @@ namespace semblance::problems {
 struct TrialRow {
   std::string id, subject;
   std::vector<std::string> values;        // one per axis
-  std::string status;                     // done, unusable, failed, missing
-  std::string reason;                     // why it failed or is unusable
+  std::string status;                     // done, unusable, failed, damaged, missing
+  std::string reason;                     // why it failed, or is unusable or damaged
   std::map<std::string, double> metrics;  // by dotted path in result.json; finite ones only
   std::vector<double> quantiles_mm = {};  // of the face's error (FaceMetrics); empty: none
   std::vector<double> step_rms_mm = {};   // before the first step of the fit, after each
@@ -28,6 +29,9 @@ struct TrialRow {
   // be the same in every run contains it.
   double wall_s = kNaN;
   std::vector<double> depth_pit = {}, left_out_pit = {};  // the same as PIT histograms (scores.h)
+  // The version that made the trial if it is not this one ("0.0.1"), or "another build of 1.0.0";
+  // empty: this program made it.
+  std::string made_by_other = {};
 };
 
 struct StudyResults {
@@ -43,8 +47,17 @@ struct StudyResults {
   bool HasMetric() const;
 };
 
-// Reads a study's folder. Throws IoError if plan.json is missing or is not the plan of a study.
-StudyResults ReadStudyResults(const std::filesystem::path& folder);
+// Reads a study's folder. A trial that is not sound (trial_folder.h) is `damaged` and has no
+// numbers. Throws IoError if plan.json is missing or is not the plan of a study.
+StudyResults ReadStudyResults(const std::filesystem::path& folder,
+                              TrialCheck check = TrialCheck::kSizes);
+
+// Returns notes on trials that this program did not make, one line per version: "4 of 6 trials were
+// made by version 0.0.1 ...". Such numbers may differ for another reason than the treatments.
+std::vector<std::string> VersionNotes(const StudyResults& results);
+
+// Returns a line that names the damaged trials; empty if there is none.
+std::string DamageText(const StudyResults& results);
 
 // Returns a note if the treatments of a subject were measured on areas that differ by more than
 // 0.5 %, because their errors then differ for another reason than the treatments. Empty if all
@@ -57,6 +70,7 @@ struct Treatment {
   std::string label;                         // TreatmentLabel of the values
   std::vector<std::size_t> trials;           // the trials that are done, in the order of the plan
   std::map<std::string, double> by_subject;  // the metric of these trials
+  int unusable = 0;                          // trials that ran, but whose result is not usable
 };
 // Returns the title if the study sets one, else all values that are not empty.
 std::string TreatmentLabel(const std::vector<std::string>& axes,
@@ -66,8 +80,12 @@ std::vector<Treatment> Treatments(const StudyResults& results, const std::string
 // Writes trials.csv, with one line per number in the order of the plan: trial, subject, the axes,
 // status, reason, metric, value.
 std::string TrialsCsv(const StudyResults& results);
-// Writes summary.csv: the axes, metric, n, mean, sd, median, min, max and the bootstrap's 95 %
-// interval of the mean over subjects.
+// One line on the trials whose results are not usable, by treatment: no ranking, mean or test
+// counts them. Empty if there are none.
+std::string UnusableText(const StudyResults& results);
+
+// Writes summary.csv: the axes, metric, n, mean, sd, median, min, max, the bootstrap's 95 %
+// interval of the mean over subjects, and the number of trials that are left out as not usable.
 std::string SummaryCsv(const StudyResults& results);
 
 }  // namespace semblance::problems

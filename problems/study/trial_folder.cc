@@ -4,10 +4,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <cmath>
+#include <exception>
 #include <nlohmann/json.hpp>
 #include <span>
 #include <utility>
 
+#include "problems/config/terminal_text.h"
+#include "problems/io/manifest.h"
 #include "problems/io/staged_folder.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
@@ -36,37 +41,116 @@ bool FileExists(const fs::path& file) {
   return fs::exists(file, ignored);
 }
 
-// Returns true if the member is a text or missing.
-bool IsTextOrMissing(const Json& json, const char* key) {
-  return !json.contains(key) || json[key].is_string();
+// ---------------------------------------------------------------------------------------------
+// The hash of a trial.json
+// ---------------------------------------------------------------------------------------------
+
+constexpr const char* kOwnHash = "trial_sha256";
+constexpr std::array kMadeBy = {"version", "program", "libraries"};
+
+std::string ThisBuild() {
+  constexpr std::size_t kDigits = 12;
+  return ProgramHash().substr(0, kDigits);
 }
 
-// Returns the first mismatch between the files and the hashes in `list`, or "".
-std::string FindHashFault(const fs::path& trial, std::span<const fs::path> files,
-                          const Json& list) {
-  for (const Json& entry : list.is_array() ? list : Json::array()) {
-    const bool is_named = entry.is_object() && entry.contains("file") && entry["file"].is_string();
-    const std::string name = is_named ? entry["file"].get<std::string>() : "";
-    if (std::ranges::find(files, fs::path(name)) == files.end()) {
-      return fmt::format("{} is missing", name);
+// JSON without the blanks between its tokens, so that a program that writes the same members in
+// other lines keeps the hash.
+std::string WithoutBlanks(std::string_view json) {
+  std::string bare;
+  bool in_text = false;
+  for (std::size_t k = 0; k < json.size(); ++k) {
+    const char c = json[k];
+    if (in_text && c == '\\' && k + 1 < json.size()) {
+      bare.append(json.substr(k++, 2));
+      continue;
     }
-    if (entry.value("sha256", Json()) != Sha256OfFile(trial / name)) {
-      return fmt::format("{} is not what was written", name);
+    in_text ^= c == '"';
+    if (in_text || (c != ' ' && c != '\n' && c != '\r' && c != '\t')) {
+      bare += c;
+    }
+  }
+  return bare;
+}
+
+// Compares the text with its own hash. Trials of versions before 1.1 have none; the tables report
+// them by their version.
+bool HasOwnHash(std::string_view text, const std::string& version) {
+  const std::string bare = WithoutBlanks(text), mark = fmt::format(",\"{}\":\"", kOwnHash);
+  const std::size_t at = bare.rfind(mark);
+  if (at == bare.npos) {
+    return !version.empty() && version != SEMBLANCE_VERSION;
+  }
+  const std::string hash = Sha256OfText(bare.substr(0, at));
+  return bare.compare(at + mark.size(), hash.size(), hash) == 0;
+}
+
+// ---------------------------------------------------------------------------------------------
+// The files of a trial
+// ---------------------------------------------------------------------------------------------
+
+// True for a name that leads to a file below the trial's folder by no link.
+bool IsFileBelow(const fs::path& trial, const fs::path& name) {
+  std::error_code ignored;
+  fs::path at = trial;
+  for (const fs::path& part : name) {
+    at /= part;
+    if (part == ".." || fs::is_symlink(fs::symlink_status(at, ignored))) {
+      return false;
+    }
+  }
+  return !name.is_absolute() && fs::is_regular_file(at, ignored);
+}
+
+// Returns the first mismatch between a file and its entry, or "".
+std::string FindFileFault(const fs::path& trial, const TrialFile& file, bool reads_bytes) {
+  const fs::path path = trial / file.name;
+  if (!IsFileBelow(trial, file.name)) {
+    return fmt::format("{} is missing", file.name);
+  }
+  const auto bytes = static_cast<double>(fs::file_size(path));
+  if (std::isfinite(file.bytes) && bytes != file.bytes) {
+    return fmt::format("{} has {} bytes instead of {}", file.name, bytes, file.bytes);
+  }
+  return reads_bytes && Sha256OfFile(path) != file.sha256
+             ? fmt::format("{} is not what was written", file.name)
+             : "";
+}
+
+std::string FindFileFault(const fs::path& trial, std::span<const TrialFile> files,
+                          TrialCheck check) {
+  constexpr std::array<std::string_view, 2> kShown = {"scene.json", "depth.png"};
+  for (const TrialFile& file : files) {
+    const bool reads_bytes =
+        check == TrialCheck::kAll ||
+        (check == TrialCheck::kShown && std::ranges::find(kShown, file.name) != kShown.end());
+    if (std::string fault = FindFileFault(trial, file, reads_bytes); !fault.empty()) {
+      return fault;
     }
   }
   return "";
 }
 
-std::string FindFileFault(const fs::path& trial, std::span<const fs::path> files,
-                          const Json& trial_json) {
-  const std::string fault = FindHashFault(trial, files, trial_json.value("files", Json()));
-  const Json manifest = fault.empty() && FileExists(trial / "manifest.json")
-                            ? ParsedOrNull(trial / "manifest.json")
-                            : Json::object();
-  if (!fault.empty() || !manifest.is_object()) {
-    return fault.empty() ? "manifest.json cannot be read" : fault;
+// The outputs that the manifest of a run lists.
+std::vector<TrialFile> ListOutputs(const Json& manifest) {
+  std::vector<TrialFile> files;
+  const Json list = manifest.value("outputs", Json());
+  for (const Json& entry : list.is_array() ? list : Json::array()) {
+    const auto text = [&](const char* key) {
+      const Json value = entry.is_object() ? entry.value(key, Json()) : Json();
+      return value.is_string() ? value.get<std::string>() : "";
+    };
+    files.push_back({.name = text("file"), .sha256 = text("sha256")});
   }
-  return FindHashFault(trial, files, manifest.value("outputs", Json()));
+  return files;
+}
+
+std::string FindManifestFault(const fs::path& trial) {
+  if (!FileExists(trial / "manifest.json")) {
+    return "";
+  }
+  const Json manifest = ParsedOrNull(trial / "manifest.json");
+  return manifest.is_object() ? FindFileFault(trial, ListOutputs(manifest), TrialCheck::kAll)
+                              : "manifest.json cannot be read";
 }
 
 // Lists the files of a folder, relative to it, trial.json last. Returns a fault if the folder holds
@@ -109,6 +193,10 @@ class TrialHandler : public nlohmann::json_sax<Json> {
   bool string(string_t& value) override {
     if (std::string* place = TextPlace()) {
       *place = std::move(value);
+    } else if (path_ == "files.file") {
+      trial_.files.emplace_back().name = std::move(value);
+    } else if (path_ == "files.sha256" && !trial_.files.empty()) {
+      trial_.files.back().sha256 = std::move(value);
     }
     return IsInObject();
   }
@@ -146,6 +234,8 @@ class TrialHandler : public nlohmann::json_sax<Json> {
            : path_ == "id"           ? &trial_.id
            : path_ == "status"       ? &trial_.status
            : path_ == "reason"       ? &trial_.reason
+           : path_ == "version"      ? &trial_.version
+           : path_ == "program"      ? &trial_.program
                                      : nullptr;
   }
   bool IsInObject() const { return !path_lengths_.empty(); }  // trial.json itself is an object
@@ -159,6 +249,8 @@ class TrialHandler : public nlohmann::json_sax<Json> {
       } else {
         trial_.metrics[path_.substr(kResult.size())] = value;
       }
+    } else if (path_ == "files.bytes" && !trial_.files.empty()) {
+      trial_.files.back().bytes = value;
     }
     return IsInObject() && IsNotText();
   }
@@ -185,15 +277,64 @@ fs::path WritableTrialFolder(const fs::path& study, const std::string& id) {
   return TrialFolder(study, id);
 }
 
-std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) {
+bool IsOfThisProgram(const TrialNumbers& trial) {
+  return trial.version == SEMBLANCE_VERSION && trial.program == ThisBuild();
+}
+
+std::string TrialText(Json json, Maker maker) {
+  Json made_by = Json::object();
+  if (maker == Maker::kThisProgram) {
+    made_by = {
+        {"version", SEMBLANCE_VERSION}, {"program", ThisBuild()}, {"libraries", Json::object()}};
+    for (const auto& [name, version] : LibraryVersions()) {
+      made_by["libraries"][name] = version;
+    }
+  }
+  for (const char* name : kMadeBy) {
+    if (maker == Maker::kAsBefore && json.contains(name)) {
+      made_by[name] = json[name];
+    }
+    json.erase(name);
+  }
+  json.erase(kOwnHash);
+  json = WithPlainTexts(json);
+  std::string before = json.dump();
+  before.pop_back();  // the brace at the end
+  json[kOwnHash] = Sha256OfText(before);
+  json.update(made_by);
+  return json.dump(1) + "\n";
+}
+
+StoredTrial ReadTrial(const fs::path& study, const std::string& id, TrialCheck check) {
   const fs::path file = TrialFolder(study, id) / kTrialFile;
   if (!FileExists(file)) {
-    return std::nullopt;
+    return {};
   }
-  Json json = ParsedOrNull(file);
-  const bool is_whole = json.is_object() && json.value("id", Json()) == id &&
-                        IsTextOrMissing(json, "status") && IsTextOrMissing(json, "reason");
-  return is_whole ? std::optional(std::move(json)) : std::nullopt;
+  StoredTrial stored;
+  try {
+    const std::string text = ReadFileBytes(file);
+    std::optional<TrialNumbers> numbers = ReadTrialNumbers(text);
+    stored.fault = !numbers                              ? "trial.json cannot be read"
+                   : numbers->id != id                   ? "trial.json is of another trial"
+                   : !HasOwnHash(text, numbers->version) ? "trial.json is not what was written"
+                                                         : "";
+    if (stored.fault.empty()) {
+      stored.fault = FindFileFault(TrialFolder(study, id), numbers->files, check);
+    }
+    if (stored.fault.empty()) {
+      stored.numbers = std::move(numbers);
+    }
+  } catch (const std::exception& error) {  // of IoError and of the file system
+    stored.fault = error.what();
+  }
+  return stored;
+}
+
+std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) {
+  constexpr TrialCheck kFast = TrialCheck::kSizes;
+  return ReadTrial(study, id, kFast).numbers
+             ? std::optional(ParsedOrNull(TrialFolder(study, id) / kTrialFile))
+             : std::nullopt;
 }
 
 StoredPlan ReadStoredPlan(const fs::path& study) {
@@ -223,19 +364,22 @@ std::string ReadPlanHash(const fs::path& study) { return ReadStoredPlan(study).h
 Json ListHashes(const fs::path& trial, const std::vector<std::string>& names) {
   Json list = Json::array();
   for (const std::string& name : names) {
-    list.push_back({{"file", name}, {"sha256", Sha256OfFile(trial / name)}});
+    list.push_back({{"file", name},
+                    {"bytes", fs::file_size(trial / name)},
+                    {"sha256", Sha256OfFile(trial / name)}});
   }
   return list;
 }
 
 std::string CopyTrial(const fs::path& from, const fs::path& to, const std::string& id) {
   const fs::path trial = TrialFolder(from, id);
-  const std::optional<Json> json = ReadTrialFile(from, id);
-  std::vector<fs::path> files;
-  std::string fault = json ? ListFiles(trial, files) : "it is not whole";
-  if (fault.empty()) {
-    fault = FindFileFault(trial, files, *json);
+  if (!FileExists(trial / kTrialFile)) {
+    return "trial.json is missing";
   }
+  std::vector<fs::path> files;
+  std::string fault = ListFiles(trial, files);
+  fault = fault.empty() ? ReadTrial(from, id, TrialCheck::kAll).fault : fault;
+  fault = fault.empty() ? FindManifestFault(trial) : fault;
   if (!fault.empty()) {
     return fault;
   }

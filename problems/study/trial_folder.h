@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A study on disk: plan.json, and one folder per trial. A trial is whole if its trial.json is.
+// A study on disk: plan.json, and one folder per trial. A trial is sound if its trial.json is what
+// was written, which its own hash shows, and if its other files have the hashes that trial.json
+// lists.
 #pragma once
 
 #include <filesystem>
@@ -10,6 +12,8 @@
 #include <string_view>
 #include <vector>
 
+#include "surfaces/base/geometry.h"
+
 namespace semblance::problems {
 
 std::filesystem::path TrialFolder(const std::filesystem::path& study, const std::string& id);
@@ -19,8 +23,14 @@ std::filesystem::path TrialFolder(const std::filesystem::path& study, const std:
 std::filesystem::path WritableTrialFolder(const std::filesystem::path& study,
                                           const std::string& id);
 
-// Reads the trial.json of a whole trial. Returns nothing if it is missing, cut short, or of another
-// trial, or if its status or reason is not a text.
+// Writes a trial.json: the members, then `trial_sha256`, the hash of all before it, and then
+// `version`, `program` and `libraries`. These three are not hashed, because a trial of another
+// version is sound; it is reported. kThisProgram sets them, kAsBefore keeps those of `json`.
+enum class Maker { kThisProgram, kAsBefore };
+std::string TrialText(nlohmann::ordered_json json, Maker maker);
+
+// Reads the trial.json of a trial. Returns nothing if it is missing, not what was written, or of
+// another trial.
 std::optional<nlohmann::ordered_json> ReadTrialFile(const std::filesystem::path& study,
                                                     const std::string& id);
 
@@ -35,29 +45,52 @@ StoredPlan ReadStoredPlan(const std::filesystem::path& study);
 // Reads the hash alone.
 std::string ReadPlanHash(const std::filesystem::path& study);
 
-// Lists one entry {file, sha256} per name, for trial.json.
+// Lists one entry {file, bytes, sha256} per name, for trial.json.
 nlohmann::ordered_json ListHashes(const std::filesystem::path& trial,
                                   const std::vector<std::string>& names);
 
-// Copies a whole trial to another study's folder, completely or not at all, trial.json last.
-// Returns "", or the reason why it was not copied: a file that trial.json or manifest.json names is
-// missing or has another hash, or the folder has links or devices, which may lead out of it. Throws
-// IoError if a file cannot be read or written.
-std::string CopyTrial(const std::filesystem::path& from, const std::filesystem::path& to,
-                      const std::string& id);
+// A file of a trial, as trial.json lists it.
+struct TrialFile {
+  std::string name;
+  double bytes = kNaN;  // NaN in a trial of an older version
+  std::string sha256;
+};
 
 // The parts of a trial.json that the tables of a study need. They are read from the text without a
 // JSON tree, because a study has thousands of trials with hundreds of numbers each.
 struct TrialNumbers {
   std::string id, status = "failed", reason;
+  std::string version, program;           // that made it
   std::map<std::string, double> metrics;  // numbers of `result` by dotted path
   // The numbers in lists of `result`, in their order; a list of objects gives one list per member;
   // null becomes NaN.
   std::map<std::string, std::vector<double>> lists;
+  std::vector<TrialFile> files;
 };
 
+// Returns true if this version and this build of the program made the trial.
+bool IsOfThisProgram(const TrialNumbers& trial);
+
 // Returns nothing if the text is not a JSON object, is nested deeper than kDeepestJson, or has an
-// id, status or reason that is not a text.
+// id, status, reason or version that is not a text.
 std::optional<TrialNumbers> ReadTrialNumbers(std::string_view text);
+
+// The files of a trial of which the bytes are compared with trial.json's hashes: none, only their
+// sizes; those that a report shows; all.
+enum class TrialCheck { kSizes, kShown, kAll };
+
+// A trial on disk. If there is no trial.json, both members are empty.
+struct StoredTrial {
+  std::optional<TrialNumbers> numbers;  // of a sound trial
+  std::string fault;                    // the reason why it is not sound
+};
+StoredTrial ReadTrial(const std::filesystem::path& study, const std::string& id, TrialCheck check);
+
+// Copies a sound trial to another study's folder, completely or not at all, trial.json last.
+// Returns "", or the reason why it was not copied: a fault of ReadTrial, a file that manifest.json
+// names is missing or has another hash, or the folder has links or devices, which may lead out of
+// it. Throws IoError if a file cannot be read or written.
+std::string CopyTrial(const std::filesystem::path& from, const std::filesystem::path& to,
+                      const std::string& id);
 
 }  // namespace semblance::problems

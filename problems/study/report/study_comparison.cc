@@ -163,8 +163,14 @@ std::vector<std::string> ComparisonNotes(std::span<const NamedStudy> studies,
       notes.push_back(fmt::format("{}: left out because not all studies have them: {}", study.name,
                                   Counted(static_cast<long long>(left), "subject")));
     }
-    const int not_done =
-        static_cast<int>(study.results.trials.size()) - study.results.Count("done");
+    if (const std::string unusable = UnusableText(study.results); !unusable.empty()) {
+      notes.push_back(fmt::format("{}: {}", study.name, unusable));
+    }
+    const int not_done = static_cast<int>(study.results.trials.size()) -
+                         study.results.Count("done") - study.results.Count("unusable");
+    for (const std::string& note : VersionNotes(study.results)) {
+      notes.push_back(fmt::format("{}: {}", study.name, note));
+    }
     if (not_done > 0) {
       notes.push_back(fmt::format("{}: not finished, so not compared: {} of {}", study.name,
                                   not_done, Counted(std::ssize(study.results.trials), "trial")));
@@ -191,6 +197,9 @@ std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders) {
   std::vector<NamedStudy> studies;
   for (std::size_t k = 0; k < real.size(); ++k) {
     studies.push_back({names[k], ReadStudyResults(folders[k]), folders[k]});
+    if (const std::string damaged = DamageText(studies.back().results); !damaged.empty()) {
+      throw IoError(fmt::format("{}: {}", folders[k].string(), damaged));
+    }
   }
   return studies;
 }

@@ -22,8 +22,8 @@ struct NamedStudy {
 };
 
 // The results in each folder. A study is named by its folder, and by more of the path if two
-// folders have the same name. Throws IoError as ReadStudyResults, and InputError if a folder
-// appears twice.
+// folders have the same name. Throws IoError as ReadStudyResults and for a damaged trial, and
+// InputError if a folder appears twice.
 std::vector<NamedStudy> ReadStudies(const std::vector<std::filesystem::path>& folders);
 
 // A treatment of one study, over the subjects that all studies have.

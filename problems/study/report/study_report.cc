@@ -39,12 +39,12 @@ std::vector<double> CollectValues(const Treatment& treatment) {
 ReportTable RankingTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
   ReportTable table{fmt::format("Treatments by {}, {}{}", WordsOfMetric(results.metric),
                                 RankingOrderText(results.preference), LabelPartsText(results)),
-                    {"treatment", "rank", "subjects", "mean", "mean, 95 % interval", "sd", "median",
-                     "min", "max", "mean seconds"}};
+                    {"treatment", "rank", "subjects", "not usable", "mean", "mean, 95 % interval",
+                     "sd", "median", "min", "max", "mean seconds"}};
   for (const Treatment& treatment : ranked) {
     const SampleSummary s = Summarize(CollectValues(treatment));
-    table.AddRow(treatment.label, s.n > 0 ? std::to_string(table.rows.size() + 1) : "", s.n, s.mean,
-                 IntervalText(s.mean_95), s.sd, s.median, s.min, s.max,
+    table.AddRow(treatment.label, s.n > 0 ? std::to_string(table.rows.size() + 1) : "", s.n,
+                 treatment.unusable, s.mean, IntervalText(s.mean_95), s.sd, s.median, s.min, s.max,
                  TableNumber(MeanSeconds(results, treatment), 1));
     table.links.push_back(
         treatment.trials.empty() ? "" : "#" + TrialAnchor(results.trials[treatment.trials[0]]));
@@ -409,6 +409,12 @@ std::vector<std::string> StudyNotes(const StudyResults& results) {
     notes.push_back(
         fmt::format("{} failed; the table of trials has the reasons.", Counted(failed, "trial")));
   }
+  if (const std::string unusable = UnusableText(results); !unusable.empty()) {
+    notes.push_back(unusable + ".");
+  }
+  if (const std::string damaged = DamageText(results); !damaged.empty()) {
+    notes.push_back(damaged + ".");
+  }
   if (missing > 0) {
     notes.push_back(fmt::format("{} not run yet, so the results may still change.",
                                 Counted(missing, "trial is", "trials are")));
@@ -442,7 +448,7 @@ std::string StudyPage(const StudyResults& results, const std::filesystem::path& 
 }  // namespace
 
 StudyResults WriteStudyTables(OutputFolder& folder) {
-  StudyResults results = ReadStudyResults(folder.Root());
+  StudyResults results = ReadStudyResults(folder.Root(), TrialCheck::kShown);
   struct Table {
     const char* name;
     std::function<std::string()> text_of;

@@ -4,10 +4,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
+#include <vector>
 
 #include "problems/config/config.h"
 #include "problems/run.h"
+#include "problems/study/report/study_comparison.h"
 #include "problems/study/report/study_report.h"
 #include "problems/study/study_metrics.h"
 #include "problems/study/study_run.h"
@@ -104,6 +108,122 @@ TEST_F(StudyTest, TrialsThatLackKeptFilesRunAgain) {
   EXPECT_TRUE(fs::exists(folder_ / "run" / "trials" / view.trials[0].id / "scene.json"));
   EXPECT_EQ(RunStudy(view, folder_ / "run", {}, {}).skipped, 1);
   EXPECT_EQ(RunStudy(summary, folder_ / "run", {}, {}).skipped, 1);
+}
+
+// Whatever is damaged in a trial, the next call gives the bytes of an undamaged study.
+TEST_F(StudyTest, DamagedTrialsRunAgain) {
+  const StudyPlan plan = Plan(std::string(kSmall) + "keep: view\n");
+  RunStudy(plan, folder_ / "run", {.jobs = 2}, {});
+  const auto whole = StudyFiles(folder_ / "run");
+  const fs::path one = folder_ / "run/trials" / plan.trials[0].id,
+                 two = folder_ / "run/trials" / plan.trials[1].id;
+  const auto change = [](const fs::path& file, const std::function<void(std::string&)>& edit) {
+    std::string text = ReadFileBytes(file);
+    edit(text);
+    WriteFileAtomically(file, text);
+  };
+  const auto exchange_results = [&] {
+    auto a = nlohmann::ordered_json::parse(ReadFileBytes(one / "trial.json")),
+         b = nlohmann::ordered_json::parse(ReadFileBytes(two / "trial.json"));
+    std::swap(a["result"], b["result"]);
+    WriteFileAtomically(one / "trial.json", a.dump(1) + "\n");
+    WriteFileAtomically(two / "trial.json", b.dump(1) + "\n");
+  };
+  const auto set_number = [&](const nlohmann::ordered_json& value) {
+    auto json = nlohmann::ordered_json::parse(ReadFileBytes(one / "trial.json"));
+    json["result"]["implicit_face"]["rms_mm"] = value;
+    WriteFileAtomically(one / "trial.json", json.dump(1) + "\n");
+  };
+  const std::vector<std::function<void()>> damages = {
+      [&] { fs::resize_file(one / "scene.json", 1000); },
+      [&] { fs::remove(one / "scene.json"); },
+      [&] { change(one / "scene.json", [](std::string& text) { text[text.size() / 2] ^= 1; }); },
+      [&] { fs::resize_file(one / "trial.json", 500); },
+      [&] {
+        change(one / "trial.json", [](std::string& text) { text[text.find("rms_mm") + 12] ^= 1; });
+      },
+      exchange_results,
+      [&] {
+        fs::copy_file(one / "trial.json", two / "trial.json", fs::copy_options::overwrite_existing);
+      },
+      [&] { set_number(nullptr); },
+      [&] { set_number("1.25"); },
+  };
+  for (std::size_t n = 0; n < damages.size(); ++n) {
+    damages[n]();
+    OutputFolder output(folder_ / "run", WhenNotEmpty::kReplaceFiles);
+    const StudyResults results = WriteStudyTables(output);
+    EXPECT_GE(results.Count("damaged"), 1) << n;
+    EXPECT_EQ(results.Count("damaged") + results.Count("done"), 4) << n;
+    EXPECT_THAT(ReadFileBytes(folder_ / "run/report.html"), HasSubstr("damaged and left out")) << n;
+    if (n != 2) {  // a comparison reads no scene
+      EXPECT_THAT(WordsOf<IoError>([&] {
+                    ReadStudies({folder_ / "run", folder_ / "whole"});
+                  }),
+                  HasSubstr("damaged"))
+          << n;
+    }
+    const StudySummary again = RunStudy(plan, folder_ / "run", {.jobs = 2}, {});
+    EXPECT_EQ(static_cast<int>(again.damaged.size()), again.done) << n;
+    EXPECT_EQ(StudyFiles(folder_ / "run"), whole) << n;
+  }
+}
+
+// A sound trial of another folder replaces a damaged one; a damaged one is never taken.
+TEST_F(StudyTest, AMergeReplacesDamagedTrialsAndTakesNone) {
+  const StudyPlan plan = Plan(kSmall);
+  RunStudy(plan, folder_ / "whole", {.jobs = 2}, {});
+  const auto whole = StudyFiles(folder_ / "whole");
+  fs::copy(folder_ / "whole", folder_ / "damaged", fs::copy_options::recursive);
+  const fs::path file = folder_ / "damaged/trials" / plan.trials[0].id / "trial.json";
+  std::string text = ReadFileBytes(file);
+  text[text.find("rms_mm") + 12] ^= 1;
+  WriteFileAtomically(file, text);
+  const auto not_taken = GatherTrials(folder_ / "new", {folder_ / "damaged"});
+  EXPECT_THAT(not_taken, ::testing::ElementsAre(HasSubstr("trial.json is not what was written")));
+  EXPECT_EQ(ReadStudyResults(folder_ / "new").Count("missing"), 1);
+  EXPECT_THAT(GatherTrials(folder_ / "damaged", {folder_ / "whole"}), ::testing::IsEmpty());
+  EXPECT_EQ(StudyFiles(folder_ / "damaged"), whole);
+}
+
+TEST_F(StudyTest, TrialsOfAnotherVersionAreNamedAndCanRunAgain) {
+  const StudyPlan plan = Plan(kSmall);
+  RunStudy(plan, folder_ / "run", {.jobs = 2}, {});
+  const auto own = StudyFiles(folder_ / "run");
+  EXPECT_THAT(VersionNotes(ReadStudyResults(folder_ / "run")), ::testing::IsEmpty());
+  for (int n = 0; n < 3; ++n) {
+    const fs::path file = folder_ / "run/trials" / plan.trials[n].id / "trial.json";
+    auto json = nlohmann::ordered_json::parse(ReadFileBytes(file));
+    json["version"] = "0.0.1";
+    json["libraries"]["ceres"] = "1.0";
+    WriteFileAtomically(file, json.dump(1) + "\n");
+  }
+  const std::string words = "3 of 4 trials were made by version 0.0.1";
+  EXPECT_EQ(RunStudy(plan, folder_ / "run", {}, {}).skipped, 4);
+  EXPECT_THAT(VersionNotes(ReadStudyResults(folder_ / "run")),
+              ::testing::ElementsAre(HasSubstr(words)));
+  EXPECT_THAT(StudyFiles(folder_ / "run").at("report.html"), HasSubstr(words));
+  GatherTrials(folder_ / "merged", {folder_ / "run"});
+  EXPECT_THAT(StudyFiles(folder_ / "merged").at("report.html"), HasSubstr(words));
+  RunStudy(plan, folder_ / "new", {.jobs = 2}, {});
+  EXPECT_THAT(CompareStudies(ReadStudies({folder_ / "run", folder_ / "new"}), {}).notes,
+              ::testing::Contains(HasSubstr(words)));
+  EXPECT_EQ(RunStudy(plan, folder_ / "run", {.jobs = 2, .rerun = Rerun::kOtherVersions}, {}).done,
+            3);
+  EXPECT_EQ(StudyFiles(folder_ / "run"), own);
+}
+
+// The trial would have the id of the file as it was.
+TEST_F(StudyTest, AFileThatChangesWhileAStudyRunsEndsIt) {
+  const fs::path network = folder_ / "network.yaml";
+  fs::copy_file(fmt::format("{}/configs/networks/standard32.yaml", SEMBLANCE_SOURCE_DIR), network);
+  const StudyPlan plan = Plan("grid: {network: [network.yaml]}\n");
+  WriteFileAtomically(network, ReadFileBytes(network) + "\n");
+  EXPECT_THAT(WordsOf<IoError>([&] { RunStudy(plan, folder_ / "run", {}, {}); }),
+              HasSubstr("network.yaml has changed since the study began"));
+  EXPECT_EQ(ReadStudyResults(folder_ / "run").Count("missing"), 1);
+  const StudyPlan changed = Plan("grid: {network: [network.yaml]}\n");
+  EXPECT_NE(changed.trials[0].id, plan.trials[0].id);
 }
 
 TEST_F(StudyTest, OnlySelectedTrialsRunAndTheOthersCanFollow) {

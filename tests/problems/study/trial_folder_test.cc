@@ -42,7 +42,12 @@ class TrialFolders : public ::testing::Test {
     fs::create_directories((From() / name).parent_path());
     WriteFileAtomically(From() / name, text);
   }
-  void WriteTrial(const nlohmann::ordered_json& json) const { Write("trial.json", json.dump()); }
+  void WriteTrial(const nlohmann::ordered_json& json) const {
+    Write("trial.json", TrialText(json, Maker::kThisProgram));
+  }
+  StoredTrial Read(TrialCheck check = TrialCheck::kAll) const {
+    return ReadTrial(folder_ / "from", "a", check);
+  }
   std::string Copy() const { return CopyTrial(folder_ / "from", folder_ / "to", "a"); }
   // The copy is refused and writes nothing.
   void ExpectNotTaken(const std::string& words) const {
@@ -118,8 +123,67 @@ TEST_F(TrialFolders, AnIncompleteTrialDoesNotExist) {
                            "{\"id\": \"a\", \"status\": 3}", "{\"id\": \"a\", \"reason\": []}"}) {
     Write("trial.json", text);
     EXPECT_FALSE(ReadTrialFile(folder_ / "from", "a")) << text;
-    ExpectNotTaken("it is not whole");
+    ExpectNotTaken("trial.json");
   }
+}
+
+// Every byte of a trial.json counts, except blanks between its tokens and what follows its hash.
+TEST_F(TrialFolders, EveryChangedByteOfATrialIsFound) {
+  WriteTrial({{"id", "a"}, {"status", "done"}, {"result", {{"rms_mm", 1.25}, {"n", 2}}}});
+  const std::string text = ReadFileBytes(From() / "trial.json");
+  EXPECT_TRUE(Read().numbers);
+  for (std::size_t k = 0; k < text.find("\"version\""); ++k) {
+    if (text[k] != ' ' && text[k] != '\n') {
+      std::string changed = text;
+      changed[k] = text[k] == '7' ? '8' : '7';
+      Write("trial.json", changed);
+      EXPECT_THAT(Read().fault, HasSubstr("trial.json")) << changed;
+    }
+  }
+}
+
+TEST_F(TrialFolders, ResultsOfOtherTrialsAndOtherValuesAreFound) {
+  const auto text = [](double value) {
+    return TrialText({{"id", "a"}, {"status", "done"}, {"result", {{"rms_mm", value}}}},
+                     Maker::kThisProgram);
+  };
+  for (const char* other : {"9.75", "null", "\"1.25\""}) {
+    std::string changed = text(1.25);
+    changed.replace(changed.find("1.25"), 4, other);
+    Write("trial.json", changed);
+    EXPECT_EQ(Read().fault, "trial.json is not what was written") << other;
+  }
+  Write("trial.json", TrialText({{"id", "b"}, {"status", "done"}}, Maker::kThisProgram));
+  EXPECT_EQ(Read().fault, "trial.json is of another trial");
+  // Another program may write the same members in another form.
+  const nlohmann::ordered_json same = nlohmann::ordered_json::parse(text(1.25));
+  Write("trial.json", same.dump(4));
+  EXPECT_EQ(Read().fault, "");
+}
+
+TEST_F(TrialFolders, ATrialOfAnotherVersionIsSoundAndNamed) {
+  EXPECT_TRUE(IsOfThisProgram(*Read().numbers));
+  auto json = nlohmann::ordered_json::parse(ReadFileBytes(From() / "trial.json"));
+  json["version"] = "0.0.1";
+  Write("trial.json", json.dump(1));
+  EXPECT_EQ(Read().numbers->version, "0.0.1");
+  EXPECT_FALSE(IsOfThisProgram(*Read().numbers));
+  EXPECT_EQ(TrialText(json, Maker::kAsBefore), json.dump(1) + "\n");
+  json.erase("trial_sha256");  // as versions without a hash wrote it
+  Write("trial.json", json.dump(1));
+  EXPECT_TRUE(Read().numbers);
+  json["version"] =
+      nlohmann::ordered_json::parse(TrialText({{"id", "a"}}, Maker::kThisProgram))["version"];
+  Write("trial.json", json.dump(1));
+  EXPECT_EQ(Read().fault, "trial.json is not what was written");
+}
+
+TEST_F(TrialFolders, ACutFileIsFoundByItsSizeAlone) {
+  Write("face.ply", "mes");
+  EXPECT_EQ(Read(TrialCheck::kSizes).fault, "face.ply has 3 bytes instead of 4");
+  Write("face.ply", "mesj");
+  EXPECT_EQ(Read(TrialCheck::kSizes).fault, "");
+  EXPECT_EQ(Read(TrialCheck::kAll).fault, "face.ply is not what was written");
 }
 
 TEST_F(TrialFolders, FilesOfABrokenTrialAreReplacedAndOtherFilesStay) {
