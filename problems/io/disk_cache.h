@@ -12,8 +12,12 @@
 namespace semblance::problems {
 
 // Several threads and processes may use one folder at the same time: a file is written whole or not
-// at all, contains a hash of its content, and counts as missing if the hash does not match. Faults
-// of the disk are not errors: a value that cannot be stored is computed again.
+// at all, contains a hash of its key and its content, and counts as missing if the hash does not
+// match. Faults of the disk are not errors: a value that cannot be stored is computed again.
+//
+// In a folder that several people write to, a file counts as missing unless it belongs to this
+// user, to the folder's owner or to root. A hash protects from damage and from exchanged files, but
+// anybody can compute one; so another person could otherwise provide any value.
 class DiskCache {
  public:
   // If the files exceed limit_bytes, those that were read or written longest ago are deleted.

@@ -3,6 +3,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <chrono>
 #include <thread>
@@ -61,6 +63,54 @@ TEST(DiskCache, ADamagedValueCountsAsMissing) {
   EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
   WriteFileAtomically(file, "x");
   EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
+}
+
+// A hash of the content alone would take the value of another key.
+TEST(DiskCache, ExchangedFilesCountAsMissing) {
+  const ScratchFolder folder;
+  const DiskCache cache(folder.Path(), 1 << 20);
+  const fs::path a = folder / (Key(1) + ".bin"), b = folder / (Key(2) + ".bin");
+  cache.Put(Key(1), "one");
+  cache.Put(Key(2), "two");
+  fs::rename(a, folder / "x");
+  fs::rename(b, a);
+  fs::rename(folder / "x", b);
+  EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
+  EXPECT_EQ(cache.Get(Key(2)), std::nullopt);
+  cache.Put(Key(1), "one");
+  EXPECT_EQ(cache.Get(Key(1)), "one");
+}
+
+TEST(DiskCache, LinksAndPipesAreNotRead) {
+  const ScratchFolder folder;
+  const DiskCache cache(folder / "cache", 1 << 20);
+  cache.Put(Key(1), "one");
+  const fs::path file = folder / "cache" / (Key(1) + ".bin");
+  fs::rename(file, folder / "elsewhere");
+  fs::create_symlink(folder / "elsewhere", file);
+  EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
+  fs::remove(file);
+  ASSERT_EQ(::mkfifo(file.c_str(), 0600), 0);
+  EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
+}
+
+// Only root can give files to others.
+TEST(DiskCache, InASharedFolderFilesOfOtherPeopleCountAsMissing) {
+  if (::geteuid() != 0) {
+    GTEST_SKIP() << "the test changes owners, which only root may do";
+  }
+  constexpr uid_t kFolderOwner = 12345, kOther = 12346;
+  const ScratchFolder folder;
+  const DiskCache cache(folder.Path(), 1 << 20);
+  cache.Put(Key(1), "one");
+  const fs::path file = folder / (Key(1) + ".bin");
+  ASSERT_EQ(::chown(folder.Path().c_str(), kFolderOwner, 0), 0);
+  ASSERT_EQ(::chown(file.c_str(), kFolderOwner, 0), 0);
+  EXPECT_EQ(cache.Get(Key(1)), "one");
+  ASSERT_EQ(::chown(file.c_str(), kOther, 0), 0);
+  EXPECT_EQ(cache.Get(Key(1)), std::nullopt);
+  cache.Put(Key(1), "one");
+  EXPECT_EQ(cache.Get(Key(1)), "one") << "computed and stored again";
 }
 
 TEST(DiskCache, AboveTheLimitTheLeastRecentlyUsedIsDeleted) {
