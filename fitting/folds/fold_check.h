@@ -41,4 +41,15 @@ MapFaults FaultsOfTriangles(const PlaneMap& map, std::span<const Triangle> trian
 // narrow folds: near the edge of a fold it finds about half of the area.
 MapFaults FaultsBeyondNoise(const PlaneMap& map, std::span<const Triangle> triangles);
 
+// The first case of FaultsOfPoints alone: the share of samples at whose place the map mixes several
+// sheets. The positions are scaled to the same spread along each of their principal axes, so that
+// their units have no effect. It suits maps with errors, which turn samples over by chance.
+double MixedShare(const PlaneMap& map);
+
+// Compares neighbours on the map with any points: the variance of 17 neighbours around their plane
+// over (u,v), over the variance of 17 points from everywhere around their mean; the ratio of the
+// medians of both over some hundred samples. It is 1 for places that have nothing to do with the
+// positions, and small for a surface. Returns 0 for fewer than 18 points or points at one place.
+double NeighbourScatter(const PlaneMap& map);
+
 }  // namespace semblance::fitting

@@ -30,8 +30,10 @@
 //   1. solve_ refers to points_ and space_. After a change of space_ it must Begin or Enter again.
 //   2. In JUDGED residuals_[n] is the residual of point n * every_ of the curve.
 //   3. points_.mean_weight is the mean weight of the points with outlier_ 0.
-//   4. A point is held out by its place along the curve (IsHeld). A round never fits held-out
-//      points or outliers; FitAll fits all inliers.
+//   4. A point is held out by its cell, a run of close points along the curve (ChooseHeldOut), so
+//   that
+//      near copies are held out together. A round never fits held-out points or outliers; FitAll
+//      fits all inliers.
 //   5. best_ is the last round whose held-out mean square is more than 0.1 % below that of the
 //      best round before it. So of equally good rounds the coarsest is chosen.
 //   6. weight_, metric_ and least_gain_ are the results of the last search, and the start of the
@@ -57,6 +59,7 @@
 #include "fitting/nested/weight_search.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
+#include "surfaces/hspline_query/hspline_batch.h"
 
 namespace semblance::fitting {
 namespace {
@@ -101,10 +104,19 @@ constexpr std::size_t kMinPoints = 16;  // so that a tenth of them is at least o
                   count, of_kind, kMinPoints));
 }
 
-// Returns whether a point is held out: one in ten, pseudo-randomly by its place along the curve.
-bool IsHeld(std::uint32_t k) {
-  const std::uint64_t bits = (k + 1) * 0xD1B54A32D192ED03u;
-  return (bits ^ bits >> 31) % 10 == 0;
+// Flags the points that are held out: one cell in ten, pseudo-randomly by its place along the
+// curve. A cell is a run of points that are closer together than a tenth of their usual distance.
+// Most cells hold one point.
+std::vector<char> ChooseHeldOut(const NestedPoints& points) {
+  constexpr double kClose = 0.04;  // of a step on the curve; steps are 2.5 spacings at the most
+  const CurveSteps steps(points);
+  std::vector<char> held(points.size());
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const bool is_next = k > 0 && PlaceDistance(points, k - 1, k) < kClose * steps.At(k);
+    const std::uint64_t bits = (k + 1) * 0xD1B54A32D192ED03u;
+    held[k] = is_next ? held[k - 1] : (bits ^ bits >> 31) % 10 == 0 ? 1 : 0;
+  }
+  return held;
 }
 
 // The finest level on which patches with points have more than kPointsPerPatch of them on average.
@@ -207,6 +219,7 @@ class NestedFitter {
         rounding_mm_(kRounding * MeanLengths(start).norm()),
         space_(start.shape()),
         cap_(FinestAllowed(plan, start.shape())),
+        held_(ChooseHeldOut(points_)),
         outlier_(points_.size(), 0) {
     finest_ = FinestByDensity(points_, 1, space_[0].layout, cap_);
   }
@@ -268,7 +281,7 @@ class NestedFitter {
   // The points of a round: the sample without outliers and held-out points (invariant 4).
   PointChoice RoundPoints() const {
     PointChoice choice{.every = every_, .left_out = outlier_};
-    ForEachSampled([&](std::size_t, std::uint32_t k) { choice.left_out[k] |= IsHeld(k) ? 1 : 0; });
+    ForEachSampled([&](std::size_t, std::uint32_t k) { choice.left_out[k] |= held_[k]; });
     return choice;
   }
 
@@ -366,7 +379,7 @@ class NestedFitter {
     std::vector<double> squares;
     double weights = 0;
     ForEachSampled([&](std::size_t n, std::uint32_t k) {
-      if (IsHeld(k) && outlier_[k] == 0) {
+      if (held_[k] != 0 && outlier_[k] == 0) {
         squares.push_back(Scaled(residuals_[n], k).Square());
         weights += points_.Scale(k) * points_.Scale(k);
       }
@@ -447,7 +460,7 @@ class NestedFitter {
     Indices fitted;
     std::vector<Residual> residuals;
     ForEachSampled([&](std::size_t n, std::uint32_t k) {
-      if (!IsHeld(k) && outlier_[k] == 0) {
+      if (held_[k] == 0 && outlier_[k] == 0) {
         fitted.push_back(k);
         residuals.push_back(residuals_[n]);
       }
@@ -571,13 +584,29 @@ class NestedFitter {
         }
       }
     }
+    MeasureCopies(result);
     for (const RepeatedPoint& copy : points_.repeated) {
-      const double distance = result.residual_mm[copy.given] = result.residual_mm[copy.first];
-      sum += copy.weight * distance * distance;
+      sum += copy.weight * result.residual_mm[copy.given] * result.residual_mm[copy.given];
       weights += copy.weight;
     }
     result.rms_mm = std::sqrt(sum / weights);
     report_.neighbour_correlation = neighbours.Value();
+  }
+
+  // Computes the distances of copies; those of exact copies are their original's.
+  void MeasureCopies(NestedFitResult& result) const {
+    std::vector<Vec2> uv;
+    for (const RepeatedPoint& copy : points_.repeated) {
+      uv.push_back(copy.uv);
+    }
+    const std::vector<Vec3> from = HSplineBatch(start_).Points(uv, context_.threads),
+                            to = HSplineBatch(result.surface).Points(uv, context_.threads);
+    for (std::size_t n = 0; n < uv.size(); ++n) {
+      const RepeatedPoint& copy = points_.repeated[n];
+      const Vec3 displacement = points_.axes * copy.value.head(points_.channels);
+      result.residual_mm[copy.given] =
+          copy.is_exact ? result.residual_mm[copy.first] : (from[n] + displacement - to[n]).norm();
+    }
   }
 
   // Calls use(residuals) with the residuals of all points at the last solution.
@@ -654,6 +683,7 @@ class NestedFitter {
     std::vector<std::uint32_t> copies;
     for (const RepeatedPoint& copy : points_.repeated) {
       report_.repeated.push_back(copy.given);
+      report_.near_copies += copy.is_exact ? 0 : 1;
       if (std::ranges::binary_search(report_.outliers, copy.first)) {
         copies.push_back(copy.given);
       }
@@ -672,6 +702,7 @@ class NestedFitter {
   double rounding_mm_;  // held-out error that is round-off
   NestedSpace space_;
   int cap_;                    // finest level that the plan and the shape allow
+  std::vector<char> held_;     // per point: it is held out (invariant 4)
   std::vector<char> outlier_;  // per point
   int finest_ = 0;             // finest level that the density of all points allows
   // The sample and its residuals (invariant 2).

@@ -50,6 +50,7 @@ struct AutoReport {
   bool limited_by_density = false;      // finer vertices would have too few points
   std::vector<std::uint32_t> outliers;  // given indices, ascending; these points have no weight
   std::vector<std::uint32_t> repeated;  // given indices of copies, ascending; copies count once
+  int near_copies = 0;                  // copies among them that were moved a little
 };
 
 struct NestedFitResult {
@@ -67,7 +68,8 @@ struct NestedFitResult {
 // (within 0.1 %, the coarsest) is then fitted to all points. With many points the first rounds use
 // a sample. nested_fit.cc shows the states and invariants.
 //   start: without detail. Its difference from the points is smoothed, not the surface itself.
-// Copies of a point count once. Throws InputError for a start with detail or without extent, or for
+// Copies of a point count once, also those that a second export moved a little (nested_points.h).
+// Throws InputError for a start with detail or without extent, or for
 // fewer than 16 distinct points; Cancelled.
 NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& points,
                           const AutoPlan& plan, const RunContext& context);

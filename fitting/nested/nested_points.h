@@ -24,11 +24,15 @@ struct OwnedPoints {
   ScatteredPoints View() const { return {positions, uv, weights}; }
 };
 
-// A copy of an earlier point, with the same (u,v), position and weight.
+// A copy of a point, with the same weight. An exact copy has the same (u,v) and position. The
+// others lie so close by that they are a second export of the point (SeparateTwins).
 struct RepeatedPoint {
   std::uint32_t given = 0;  // given index of the copy
   std::uint32_t first = 0;  // given index of the original
   double weight = 1;
+  bool is_exact = true;
+  Vec2 uv = Vec2::Zero();     // as NestedPoints::uv
+  Vec3 value = Vec3::Zero();  // as NestedPoints::value
 };
 
 // Points sorted along a Z-curve, so that consecutive points are neighbours and the given order has
@@ -65,7 +69,32 @@ struct NestedPoints {
   void UpdateMeanWeight(const std::vector<char>& left_out);
 };
 
-// Makes the points of a nested fit from a copy of the given points.
+// The usual distance from a point to the next one on the curve, in patches of level 0. It is the
+// 90th percentile over 64 points around, so that copies of points do not make it small.
+class CurveSteps {
+ public:
+  explicit CurveSteps(const NestedPoints& points);
+  double At(std::size_t k) const { return steps_[k / kBlock]; }
+
+ private:
+  static constexpr std::size_t kBlock = 64;
+  std::vector<double> steps_;  // per block of the curve
+};
+
+// The distance of two points in patches of level 0.
+inline double PlaceDistance(const NestedPoints& points, std::size_t a, std::size_t b) {
+  const double dx = points.X(a) - points.X(b), dy = points.Y(a) - points.Y(b);
+  return std::sqrt(dx * dx + dy * dy);
+}
+
+// Makes the points of a nested fit from a copy of the given points. Copies count once:
+// - exact copies;
+// - points nearer to another than a thousandth of the points' spacing, whose displacements differ
+// by
+//   less than a hundredth of the range around them;
+// - points nearer than a twentieth of the spacing, if they are at least a sixth of all points and
+//   differ from their neighbour by less than half of the noise. They then share its error, as in a
+//   second export, and would make the noise look smaller. Points that were measured twice stay.
 NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoints& points,
                                int threads);
 // Makes the points of a nested fit in the memory of the given points.

@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -68,6 +70,49 @@ void CheckGiven(std::span<const Vec2> uv, const Ranges& ranges, const PointNames
   }
 }
 
+// Refuses (u,v) on a line, which determine no surface.
+void CheckSpread(std::span<const Vec2> uv) {
+  constexpr double kOnLine = 1e-14;  // share of the mean squares, of round-off
+  Vec2 mean = Vec2::Zero();
+  for (const Vec2& p : uv) {
+    mean += p / static_cast<double>(uv.size());
+  }
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  for (const Vec2& p : uv) {
+    moments += (p - mean) * (p - mean).transpose();
+  }
+  const double trace = moments.trace();
+  if (!(moments.determinant() > kOnLine * trace * trace)) {
+    FailParameters(fmt::format(
+        "the given (u,v) are all {}, so they determine no surface; give each point its own place, "
+        "or leave the columns out",
+        trace > 0 ? "on one line" : fmt::format("({:.4g}, {:.4g})", mean.x(), mean.y())));
+  }
+}
+
+// Refuses (u,v) that have nothing to do with the points, and those of several sheets at one place.
+void CheckMeaning(const Scan& scan, FoldRule folds) {
+  // Heights alone, twice as large as their noise, have 0.2, and 0.5 if the noise is as large.
+  constexpr double kMostScatter = 0.85;
+  constexpr double kMostMixed = 0.1;
+  const double period = scan.closure == Closure::kPeriodicU ? 1 : 0;
+  const PlaneMap map{scan.positions, scan.given_uv, period};
+  if (NeighbourScatter(map) > kMostScatter) {
+    FailParameters(
+        "the given (u,v) do not belong to the points: neighbours in (u,v) lie as far apart in "
+        "space "
+        "as any points; a column that was sorted or shuffled apart from the others is the usual "
+        "cause; restore the order of the rows, or leave the columns u and v out");
+  }
+  if (const double mixed = folds == FoldRule::kAccept ? 0 : MixedShare(map); mixed > kMostMixed) {
+    FailParameters(fmt::format(
+        "the given (u,v) bring several sheets of points to one place, at {} of the places; give "
+        "each sheet (u,v) of its own, or fit it alone; parameters: {{type: given, folds: accept}} "
+        "fits them all the same",
+        PercentText(mixed)));
+  }
+}
+
 Parametrisation ParametriseBy(Scan scan, const GivenParameters& given) {
   if (scan.given_uv.empty()) {
     FailParameters(
@@ -81,6 +126,8 @@ Parametrisation ParametriseBy(Scan scan, const GivenParameters& given) {
       uv[c] = (uv[c] - ranges[c][0]) / (ranges[c][1] - ranges[c][0]);
     }
   }
+  CheckSpread(scan.given_uv);
+  CheckMeaning(scan, given.folds);
   return {.uv = std::move(scan.given_uv), .source = ParameterSource::kGiven};
 }
 
@@ -92,10 +139,42 @@ struct CheckedMap {
   std::string looked_at;  // all maps among which it was chosen, with their faults; for messages
 };
 
-// The larger share of each fault, by the points and by the triangles if there are any.
+// Root mean squares of the heights over a plane and of the places along its wider direction.
+struct PlaneSpreads {
+  double height_mm = 0, place_mm = 0;
+};
+PlaneSpreads MeasureSpreads(const Scan& scan, const PointMap& map) {
+  double sum = 0, squares = 0, count = static_cast<double>(scan.positions.size());
+  Vec2 places = Vec2::Zero();  // the mean place is 0
+  for (std::size_t k = 0; k < scan.positions.size(); ++k) {
+    const double height = (scan.positions[k] - scan.positions[0]).dot(map.normal);
+    sum += height;
+    squares += height * height;
+    places += map.at[k].cwiseAbs2() / count;
+  }
+  return {std::sqrt(std::max(squares / count - sum / count * (sum / count), 0.0)),
+          std::sqrt(places.maxCoeff())};
+}
+
+// The positions with their heights over the plane multiplied by `factor`.
+std::vector<Vec3> WithHeights(const Scan& scan, const PointMap& map, double factor) {
+  std::vector<Vec3> positions(scan.positions.begin(), scan.positions.end());
+  for (Vec3& p : positions) {
+    p += (factor - 1) * (p - scan.positions[0]).dot(map.normal) * map.normal;
+  }
+  return positions;
+}
+
+// The larger share of each fault, by the points and by the triangles if there are any. Heights that
+// spread more than the plane are reduced to its spread: they may have another unit.
 MapFaults FindFaults(const Scan& scan, const PointMap& map) {
   const std::vector<Vec2> in_mm = map.goes_round ? map.InMm() : std::vector<Vec2>();
-  const PlaneMap plane{scan.positions, map.goes_round ? in_mm : map.at, map.Period_mm()};
+  const PlaneSpreads spreads = MeasureSpreads(scan, map);
+  const std::vector<Vec3> lower = spreads.height_mm > spreads.place_mm
+                                      ? WithHeights(scan, map, spreads.place_mm / spreads.height_mm)
+                                      : std::vector<Vec3>();
+  const PlaneMap plane{lower.empty() ? scan.positions : lower, map.goes_round ? in_mm : map.at,
+                       map.Period_mm()};
   const MapFaults by_points = FaultsOfPoints(plane);
   if (scan.triangles.empty()) {
     return by_points;
@@ -133,8 +212,8 @@ bool MayBeTaken(const CheckedMap& map, FoldRule folds) {
   return folds == FoldRule::kAccept || map.faults.Sum() <= kMostFaults;
 }
 
-// Brings one coordinate to 0..1.
-void Normalise(int coordinate, std::vector<Vec2>& uv) {
+// Brings one coordinate to 0..1. Returns its extent.
+double Normalise(int coordinate, std::vector<Vec2>& uv) {
   double low = uv.front()[coordinate], high = low;
   for (const Vec2& p : uv) {
     low = std::min(low, p[coordinate]);
@@ -149,6 +228,7 @@ void Normalise(int coordinate, std::vector<Vec2>& uv) {
   for (Vec2& p : uv) {
     p[coordinate] = std::clamp((p[coordinate] - low) / (high - low), 0.0, 1.0);
   }
+  return high - low;
 }
 
 Parametrisation Take(CheckedMap checked, ParameterSource source) {
@@ -157,14 +237,16 @@ Parametrisation Take(CheckedMap checked, ParameterSource source) {
     p.x() = map.goes_round ? std::clamp(p.x(), 0.0, 1.0) : p.x();
     p.y() *= checked.faults.mirrored ? -1 : 1;  // so that du x dv faces as the triangles do
   }
+  Vec2 lengths_mm = Vec2::Constant(kNaN);
   if (!map.goes_round) {
-    Normalise(0, map.at);
+    lengths_mm.x() = Normalise(0, map.at);
   }
-  Normalise(1, map.at);
+  lengths_mm.y() = Normalise(1, map.at);
   return {.uv = std::move(map.at),
           .source = source,
           .how = std::move(map.how),
-          .faults = checked.faults};
+          .faults = checked.faults,
+          .lengths_mm = lengths_mm};
 }
 
 [[noreturn]] void RefusePlanes(const CheckedMap& planes) {
@@ -176,8 +258,60 @@ Parametrisation Take(CheckedMap checked, ParameterSource source) {
       planes.looked_at));
 }
 
+// Returns how much of the heights over a plane neighbours do not share (NeighbourScatter).
+double HeightScatter(const Scan& scan, const PointMap& map) {
+  std::vector<Vec3> heights;
+  for (const Vec3& p : scan.positions) {
+    heights.emplace_back((p - scan.positions[0]).dot(map.normal), 0, 0);
+  }
+  return NeighbourScatter({heights, map.at});
+}
+
+// Returns whether the points have no height over the plane: the heights spread like the places, and
+// neighbours share nothing of them, as with coordinates in different units.
+bool IsCloud(const Scan& scan, const PointMap& map) {
+  constexpr double kLeastHeight = 0.1;  // of the narrower direction of the places
+  constexpr double kMostScatter = 0.5;
+  Vec2 places = Vec2::Zero();
+  for (const Vec2& at : map.at) {
+    places += at.cwiseAbs2() / static_cast<double>(map.at.size());
+  }
+  return MeasureSpreads(scan, map).height_mm > kLeastHeight * std::sqrt(places.minCoeff()) &&
+         HeightScatter(scan, map) > kMostScatter;
+}
+
+// States that the heights over a plane are far larger than the plane; empty if they are not.
+std::string UnitsText(const PlaneSpreads& spreads) {
+  constexpr double kFarLarger = 10;  // also of steep terrain
+  return spreads.height_mm > kFarLarger * spreads.place_mm
+             ? fmt::format(
+                   ", over which heights spread {:.2g} times as far as the points along it, "
+                   "as coordinates in different units do",
+                   spreads.height_mm / spreads.place_mm)
+             : "";
+}
+
+// A plane across a coordinate axis over which the points have heights; `best` if there is none.
+CheckedMap PlaneWithHeights(const Scan& scan, const MapChoice& planes, CheckedMap best) {
+  constexpr double kMostScatter = 0.25;
+  for (int k = 1; k < planes.count; ++k) {
+    CheckedMap next{.map = planes.make(k), .faults = {}, .looked_at = best.looked_at};
+    next.faults = FindFaults(scan, next.map);
+    if (next.faults.Sum() <= kMostFaults && HeightScatter(scan, next.map) < kMostScatter) {
+      return next;
+    }
+  }
+  return best;
+}
+
 CheckedMap BestPlane(const Scan& scan, const PlaneParameters& plane) {
-  return BestMap(scan, PlanesOver(scan.positions, Vec3(plane.normal.data())));
+  const MapChoice planes = PlanesOver(scan.positions, Vec3(plane.normal.data()));
+  CheckedMap best = BestMap(scan, planes);
+  if (planes.count > 1 && IsCloud(scan, best.map)) {
+    best = PlaneWithHeights(scan, planes, std::move(best));
+  }
+  best.map.how += UnitsText(MeasureSpreads(scan, best.map));
+  return best;
 }
 
 Parametrisation ParametriseBy(const Scan& scan, const PlaneParameters& plane) {

@@ -37,6 +37,7 @@ struct GivenParameters {
   static constexpr std::string_view kName = "given";
   std::array<double, 2> u_range = {0, 1};
   std::array<double, 2> v_range = {0, 1};
+  FoldRule folds = FoldRule::kRefuse;
 };
 template <class Visitor>
 void Fields(Visitor& visit, GivenParameters& o) {
@@ -44,6 +45,10 @@ void Fields(Visitor& visit, GivenParameters& o) {
         o.u_range);
   visit(FieldInfo{.name = "v_range", .doc = "values of the column v that become 0 and 1"},
         o.v_range);
+  visit(FieldInfo{.name = "folds",
+                  .doc = "refuse: (u,v) that bring several sheets to a tenth of the places are an "
+                         "error; accept: they are fitted, and the surface lies between the sheets"},
+        o.folds);
 }
 
 // Orthogonal projection on a plane, for height fields in any pose. On a given normal's plane u runs
@@ -129,17 +134,21 @@ constexpr auto EnumNames(ParameterSource) {
 struct Parametrisation {
   std::vector<Vec2> uv;  // one per point, in [0,1] x [0,1]
   ParameterSource source = ParameterSource::kGiven;
-  std::string how = {};   // the plane, axis or map in words; empty for given (u,v)
-  MapFaults faults = {};  // of the map; none for given (u,v), which are not checked
+  std::string how = {};                    // the plane, axis or map in words; empty for given (u,v)
+  MapFaults faults = {};                   // of the map; none for given (u,v)
+  Vec2 lengths_mm = Vec2::Constant(kNaN);  // of the domain on a plane or a mesh that is laid out
 };
 
 // Finds (u,v) and checks once, at the end, that they are one-to-one (fold_check.h): at most 2 % of
-// the points may fold or collapse, except where folds are accepted. Given (u,v) are not checked.
-// du x dv faces the same way as the triangles, if there are any. Throws InputError for no points, a
-// corner of a triangle that is no point, `given` without (u,v), a number of (u,v) that differs from
-// the number of points, an empty range or (u,v) outside of it, points that span no plane or have no
-// extent along the axis, points that fold, points that close at an end of their cylinder, `mesh`
-// without triangles, and a mesh that LayOut refuses.
+// the points may fold or collapse, except where folds are accepted. Heights over a plane across a
+// given normal or an axis that spread more than the plane count by their shape, not their unit.
+// Given (u,v) may have errors; they are refused where they have nothing to do with the points, lie
+// on a line, or bring several sheets to one place. du x dv faces the same way as the triangles, if
+// there are any. Throws InputError for no points, a corner of a triangle that is no point, `given`
+// without (u,v), a number of (u,v) that differs from the number of points, an empty range or (u,v)
+// outside of it, points that span no plane or have no extent along the axis, points that fold,
+// points that close at an end of their cylinder, `mesh` without triangles, and a mesh that LayOut
+// refuses.
 Parametrisation Parametrise(Scan scan, const Parameters& parameters = AutoParameters{});
 Parametrisation Parametrise(std::span<const Vec3> positions,
                             const Parameters& parameters = AutoParameters{},

@@ -74,7 +74,7 @@ PlaneAxes PlaneAcross(const Vec3& normal) {
 
 PointMap OnPlane(std::span<const Vec3> points, const PlaneAxes& axes, std::string how) {
   const Vec3 mean = MeanPoint(points);
-  PointMap map{.how = std::move(how)};
+  PointMap map{.how = std::move(how), .normal = axes[0].cross(axes[1])};
   map.at.reserve(points.size());
   for (const Vec3& p : points) {
     map.at.emplace_back((p - mean).dot(axes[0]), (p - mean).dot(axes[1]));

@@ -27,6 +27,7 @@ struct PointMap {
   Vec2 unit_mm = Vec2::Ones();  // length of a unit of `at`
   bool goes_round = false;      // in u
   CylinderAxis axis = {};       // of a cylinder
+  Vec3 normal = Vec3::Zero();   // of a plane, unit
 
   std::vector<Vec2> InMm() const;
   double Period_mm() const { return goes_round ? unit_mm.x() : 0; }

@@ -167,7 +167,7 @@ ToleranceReport CompareWithTolerance(const FitResult& fit, const AdaptivePlan& p
   const PatchTree tree(fit.surface);
   std::set<std::int32_t> cells;
   for (std::size_t k = 0; k < fit.residual_mm.size(); ++k) {
-    if (counted[k] == 0) {
+    if (counted[k] == 0 || !fit.uv[k].allFinite()) {
       continue;
     }
     ++report.points;

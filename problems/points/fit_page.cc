@@ -30,7 +30,7 @@ std::size_t CountVertices(const HSplineSurface& surface) {
 }
 
 std::vector<std::string> Notes(const PointFit& result, const Tolerance& tolerance) {
-  std::vector<std::string> notes = FaultNotes(result.Faults());
+  std::vector<std::string> notes = result.notes;
   if (tolerance) {
     notes.push_back(ToleranceText(*tolerance));
   }
@@ -75,6 +75,13 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Tolerance& tolerance
   return tiles;
 }
 
+// The distances of the points that took part in the fit.
+std::vector<double> KnownDistances(const FitResult& fit) {
+  std::vector<double> known = fit.residual_mm;
+  std::erase_if(known, [](double distance) { return !std::isfinite(distance); });
+  return known;
+}
+
 ReportSection DistanceSection(const PointFit& result, const Tolerance& tolerance) {
   std::vector<HistogramMark> marks = {{result.fit.point_rms_mm, "RMS"},
                                       {result.distance.p95_mm, "95 %"}};
@@ -83,7 +90,7 @@ ReportSection DistanceSection(const PointFit& result, const Tolerance& tolerance
   }
   return {.heading = "Distances of the points",
           .images = {
-              {HistogramSvg(result.fit.residual_mm, marks, "distance (mm)"),
+              {HistogramSvg(KnownDistances(result.fit), marks, "distance (mm)"),
                "All points, including outliers, by their distance from the surface at their (u,v).",
                "histogram of the points' distances"}}};
 }
@@ -182,6 +189,7 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
   report.subtitle = fmt::format(
       "An H-spline surface through {} of {}",
       Counted(static_cast<long long>(result.fit.residual_mm.size()), "point"), source.name);
+  report.faults = result.Faults();
   report.notes = Notes(result, tolerance);
   report.scenes = FitScene(grid);
   report.scenes_note = "Simplified for display; surface.hspline.json is exact.";

@@ -10,6 +10,7 @@
 
 #include "fitting/plan/fit_check.h"
 #include "problems/config/config.h"
+#include "problems/config/terminal_text.h"
 #include "problems/points/fit_files.h"
 #include "problems/points/fit_page.h"
 #include "problems/report/plain_names.h"
@@ -57,6 +58,24 @@ std::string Verdict(const AutoReport& r) {
                          : "residuals look like noise: these points show no more detail";
 }
 
+std::string CopiesText(const AutoReport& r) {
+  const auto were = [](std::size_t count) {
+    return count == 1 ? std::string("1 point was") : fmt::format("{} points were", count);
+  };
+  const auto near = static_cast<std::size_t>(r.near_copies);
+  std::string text;
+  if (r.repeated.size() > near) {
+    text += fmt::format("{} given before, at the same place: each counts once\n",
+                        were(r.repeated.size() - near));
+  }
+  if (near > 0) {
+    text += fmt::format(
+        "{} given before, at nearly the same place, as by a second export: each counts once\n",
+        were(near));
+  }
+  return text;
+}
+
 }  // namespace
 
 nlohmann::ordered_json AutoJson(const AutoReport& r) {
@@ -74,6 +93,7 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"verdict", Verdict(r)},
                {"chosen_round", r.chosen_round},
                {"repeated_count", r.repeated.size()},
+               {"near_copy_count", r.near_copies},
                {"outlier_count", r.outliers.size()},
                {"outliers", r.outliers},
                {"rounds", Json::array()}};
@@ -99,11 +119,7 @@ std::string AutoText(const AutoReport& r) {
         "stretched by {:.2g}\n",
         r.direction_deg, r.stretch);
   }
-  if (!r.repeated.empty()) {
-    text += fmt::format(
-        "{} given before, at the same place: each counts once\n",
-        r.repeated.size() == 1 ? "1 point was" : fmt::format("{} points were", r.repeated.size()));
-  }
+  text += CopiesText(r);
   if (!r.outliers.empty()) {
     text += fmt::format("{} left out; residuals and result.json list {}\n",
                         Counted(std::ssize(r.outliers), "outlier"),
@@ -200,7 +216,10 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
           {"max_mm", result.distance.max_mm},
           {"control_vertices", VerticesJson(result.fit.surface)},
           {"usable", result.Faults().empty()},
-          {"faults", result.Faults()}};
+          {"faults", result.Faults()},
+          {"notes", result.notes},
+          {"not_finite_count", result.not_finite},
+          {"strays", result.strays}};
 }
 
 Json FitResultJson(const PointFitOptions& options, const PointSource& source,
@@ -259,7 +278,7 @@ void WriteAttributes(const PointFit& result, OutputFolder& folder) {
 // Lines for the terminal, besides the figures.
 std::vector<std::string> TerminalNotes(const PointFitOptions& options, const PointFit& result,
                                        double chord_mm) {
-  std::vector<std::string> notes;
+  std::vector<std::string> notes = result.notes;
   if (std::isfinite(result.weighted_rms_mm)) {
     notes.push_back(
         fmt::format("weighted RMS {:.4g} mm: points count by their weights, as in the "
@@ -311,7 +330,7 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
   folder.Write("timing.json", TimingJson(result.times));
   folder.Write(
       "result.json",
-      FitResultJson(options, source, result).dump(2, ' ', false, Json::error_handler_t::replace) +
+      WithPlainTexts(FitResultJson(options, source, result)).dump(2) +
           "\n");
   return TerminalNotes(options, result, chord_mm);
 }

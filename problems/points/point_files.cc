@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -64,26 +65,108 @@ Vec3 NextPosition(TextLines& lines) {
   return p;
 }
 
+// Reads x, y and z on each line, and leaves out as many further numbers as the first line has.
 PointTable ParseXyz(std::string_view text, const std::string& name) {
   TextLines lines(text, name, {.comment = '#'});
   PointTable table;
+  std::size_t further = 0;
   while (lines.NextLine()) {
-    table.positions.push_back(NextPosition(lines));
-    if (!lines.AtLineEnd()) {
-      lines.Fail(
-          fmt::format("'{}' follows x, y and z; leave it out, or give a CSV, whose first "
-                      "line says what the further columns are",
-                      Shown(lines.RestOfLine())));
+    Vec3 p;
+    for (int c = 0; c < 3; ++c) {
+      const double number = lines.NextDouble();
+      if (std::isinf(number)) {
+        lines.Fail("a number is infinite; give numbers, or nan for a point without a place");
+      }
+      p[c] = number;
     }
+    std::size_t count = 0;
+    for (; !lines.AtLineEnd() && (table.positions.empty() || count < further); ++count) {
+      lines.NextDouble();
+    }
+    further = table.positions.empty() ? count : further;
+    if (!lines.AtLineEnd()) {
+      lines.Fail(fmt::format(
+          "'{}' follows x, y and z; leave it out, or give a CSV, whose first line names "
+          "the further columns",
+          Shown(lines.RestOfLine())));
+    }
+    if (count != further) {
+      lines.Fail(fmt::format("{} numbers, and the first point has {}; give all points as many",
+                             count + 3, further + 3));
+    }
+    table.positions.push_back(p);
+  }
+  if (further > 0) {
+    table.notes.push_back(fmt::format(
+        "{} after x, y and z without effect; a first line such as 'x y z red green blue' names "
+        "them, so that the option `attributes` can fit them",
+        further == 1 ? "1 number" : fmt::format("{} numbers", further)));
   }
   return table;
+}
+
+std::string_view FirstLine(std::string_view text) { return text.substr(0, text.find('\n')); }
+
+// Returns whether a first line names columns: it is no comment, and begins with a letter or with
+// //.
+bool NamesColumns(std::string_view line) {
+  const std::size_t first = line.find_first_not_of(" \t\xEF\xBB\xBF\"");
+  return first != line.npos && (line.substr(first).starts_with("//") ||
+                                std::isalpha(static_cast<unsigned char>(line[first])) != 0);
+}
+
+// Turns blanks between entries into commas. A head of CloudCompare begins with //.
+std::string WithCommas(std::string_view text) {
+  std::string table;
+  table.reserve(text.size());
+  for (std::size_t begin = 0, end = 0; begin < text.size(); begin = end + 1) {
+    end = std::min(text.find('\n', begin), text.size());
+    bool is_first = true;
+    for (std::size_t at = begin; at < end;) {
+      at = std::min(text.find_first_not_of(" \t\r", at), end);
+      const std::size_t stop = std::min(text.find_first_of(" \t\r", at), end);
+      if (stop > at) {
+        std::string_view entry = text.substr(at, stop - at);
+        entry.remove_prefix(begin == 0 && entry.starts_with("//") ? 2 : 0);
+        table += is_first || entry.empty() ? "" : ",";
+        table += entry;
+        is_first = is_first && entry.empty();
+      }
+      at = stop;
+    }
+    table += end < text.size() ? "\n" : "";
+  }
+  return table;
+}
+
+// Turns semicolons between entries into commas, and decimal commas, if there are any, into points.
+std::string WithoutSemicolons(std::string_view text) {
+  std::string table(text);
+  const std::size_t rows = std::min(text.find('\n'), text.size());
+  std::replace(table.begin() + static_cast<std::ptrdiff_t>(rows), table.end(), ',', '.');
+  std::replace(table.begin(), table.end(), ';', ',');
+  return table;
+}
+
+// Reads a table with commas, semicolons or blanks between the entries. Without commas every named
+// column is allowed, because other programs write such tables.
+PointTable ParseTable(const std::string& text, const std::string& name,
+                      std::span<const std::string> attributes) {
+  const std::string_view first = FirstLine(text);
+  if (first.find(';') != first.npos && first.find(',') == first.npos) {
+    return ParsePointTable(WithoutSemicolons(text), name, attributes, FurtherColumns::kAny);
+  }
+  if (NamesColumns(first) && first.find(',') == first.npos) {
+    return ParsePointTable(WithCommas(text), name, attributes, FurtherColumns::kAny);
+  }
+  return ParsePointTable(text, name, attributes);
 }
 
 // Reads the points with all their digits, and the faces, if there are any, as triangles.
 PointTable ParseObj(std::string_view text, const std::string& name) {
   PointTable table;
   table.triangles = ReadObj(text, name).triangles;  // also without faces: it refuses other lines
-  TextLines lines(text, name, {.comment = '#'});
+  TextLines lines(text, name, {.comment = '#', .goes_on_after_backslash = true});
   while (lines.NextLine()) {
     if (lines.NextWord() == "v") {
       table.positions.push_back(NextPosition(lines));
@@ -238,8 +321,9 @@ void TakeExact(const PlyHeader& header, std::string_view bytes, const std::strin
 }
 
 bool HasFaces(const PlyHeader& header) {
-  return std::any_of(header.elements.begin(), header.elements.end(),
-                     [](const PlyElement& e) { return e.name == "face" && e.count > 0; });
+  return std::any_of(header.elements.begin(), header.elements.end(), [](const PlyElement& e) {
+    return (e.name == "face" || e.name == "tristrips") && e.count > 0;
+  });
 }
 
 PointTable ParsePlyPoints(std::string_view bytes, const std::string& name,
@@ -249,10 +333,7 @@ PointTable ParsePlyPoints(std::string_view bytes, const std::string& name,
   const std::vector<double> x = scalar("x"), y = scalar("y"), z = scalar("z");
   PointTable table;
   for (std::size_t k = 0; k < x.size(); ++k) {
-    table.positions.emplace_back(x[k], y[k], z[k]);
-    if (!table.positions.back().allFinite()) {
-      throw InputError(fmt::format("{}: point {} is not finite; leave it out", name, k + 1));
-    }
+    table.positions.emplace_back(x[k], y[k], z[k]);  // not finite where a camera saw nothing
   }
   TakeUv(header, bytes, name, table);
   TakeWeights(header, bytes, name, table);
@@ -290,8 +371,10 @@ PointTable ParseUnnamed(const std::string& bytes, const std::string& ending,
 // STL and as some programs write other files. Points that carry more than a position stay apart.
 void WeldCorners(PointTable& table) {
   const std::vector<Vec3>& points = table.positions;
-  if (table.triangles.empty() || points.size() != 3 * table.triangles.size() || !table.uv.empty() ||
-      !table.weights.empty() || !table.exact.empty() || !table.attributes.empty()) {
+  const bool all_finite = std::ranges::all_of(points, [](const Vec3& p) { return p.allFinite(); });
+  if (!all_finite || table.triangles.empty() || points.size() != 3 * table.triangles.size() ||
+      !table.uv.empty() || !table.weights.empty() || !table.exact.empty() ||
+      !table.attributes.empty()) {
     return;
   }
   const auto place = [&](std::uint32_t k) {
@@ -323,13 +406,17 @@ void WeldCorners(PointTable& table) {
 PointTable Parse(const std::string& bytes, const std::filesystem::path& path,
                  std::span<const std::string> attributes) {
   const std::string name = path.string(), ending = LowerCase(path.extension().string());
-  if (ending == ".csv" || ending == ".txt" || name == "-") {
-    return ParsePointTable(bytes, name == "-" ? "standard input" : name, attributes);
+  const std::string_view first = FirstLine(bytes);
+  const bool is_bare = ending == ".txt" && !NamesColumns(first) && first.find(',') == first.npos;
+  const bool is_named = ending == ".xyz" && NamesColumns(first);
+  if (is_named || name == "-" || ((ending == ".csv" || ending == ".txt") && !is_bare)) {
+    return ParseTable(bytes, name == "-" ? "standard input" : name, attributes);
   }
   if (ending == ".ply") {
     return NonEmpty(ParsePlyPoints(bytes, name, attributes), name);
   }
-  PointTable table = NonEmpty(ParseUnnamed(bytes, ending, name), name);
+  PointTable table =
+      NonEmpty(is_bare ? ParseXyz(bytes, name) : ParseUnnamed(bytes, ending, name), name);
   if (!attributes.empty()) {
     throw InputError(
         fmt::format("{}: it has no '{}', which the option `attributes` names; give a CSV or PLY",
@@ -372,8 +459,8 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
     std::size_t begin = 0;
     if (!points) {
       begin = all.find('\n') + 1;
-      if (begin == 0) {
-        return std::nullopt;
+      if (begin == 0 || all.substr(0, begin).find(',') == all.npos) {
+        return std::nullopt;  // one line, or another separator
       }
       points.emplace(ReadPointColumns(all.substr(0, begin - 1), path.string(), attributes));
     }
@@ -397,7 +484,8 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
 void CheckReach(const PointTable& points) {
   constexpr double kFarthest = 1e100;
   for (std::size_t k = 0; k < points.positions.size(); ++k) {
-    const double largest = points.positions[k].cwiseAbs().maxCoeff();
+    const double largest =
+        points.positions[k].hasNaN() ? 0 : points.positions[k].cwiseAbs().maxCoeff();
     if (largest > kFarthest) {
       throw InputError(fmt::format("{} has a coordinate of {:.3g}; at most 1e100 are allowed",
                                    PointName(points, k), largest));

@@ -16,14 +16,19 @@ struct PointFile {
 };
 
 // Reads the points in the format of the file's ending (in any case), possibly compressed (.csv.gz):
-// - .csv and .txt: ParsePointTable;
-// - .xyz: x, y and z on each line; # begins a comment;
+// - .csv and .txt: ParsePointTable; also with semicolons (and decimal commas), or with blanks or
+// tabs
+//   between the entries, as in `//X Y Z R G B` of CloudCompare;
+// - .xyz: x, y and z on each line, and further numbers without effect; # begins a comment; a first
+//   line may name the columns;
 // - .npy: n x 3 (x, y, z) or n x 5 (x, y, z, u, v);
 // - .ply: properties of the vertices: x, y, z; u, v or s, t; weight or sigma; exact, with nx, ny,
 //   nz; the attributes; and the faces;
 // - .obj: the lines `v` and `f`;
 // - .stl and .off: points in single precision, and triangles; equal corners of an STL are one
 // point.
+// Points without finite coordinates, as of organised clouds, stay in the table as nan; FitPoints
+// leaves them out.
 // "-" stands for a CSV on standard input.
 //   attributes: further numbers to read from a table or a PLY; other formats have none.
 // Throws IoError for a file that cannot be read, another ending, and as ParsePointTable; InputError

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -18,6 +19,7 @@
 #include "fitting/problem/start_surface.h"
 #include "fitting/solve/auto_weight.h"
 #include "problems/points/fit_files.h"
+#include "problems/report/plain_names.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
@@ -174,45 +176,290 @@ std::vector<PointAttribute> TakeAttributes(PointTable& table, const PointFitOpti
 }
 
 // Moves (u,v) and triangles out of the table, so that their memory is free during the fit.
+// given: of each point, if not all take part.
 Parametrisation FindParameters(PointTable& table, std::span<const Triangle> triangles,
+                               std::span<const std::uint32_t> given,
                                const PointFitOptions& options) {
+  const auto name_of = [&](std::size_t point) {
+    return PointName(table, given.empty() ? point : given[point]);
+  };
   return Parametrise({.positions = table.positions,
                       .given_uv = std::exchange(table.uv, {}),
                       .triangles = triangles,
                       .closure = options.closure,
-                      .name_of = [&](std::size_t point) { return PointName(table, point); }},
+                      .name_of = name_of},
                      options.parameters);
 }
 
 FootMoves MoveUv(const PointTable& table, std::span<const Triangle> triangles,
-                 const PointFitOptions& options, const RunContext& context, std::vector<Vec2>& uv) {
+                 const PointFitOptions& options, const HSplineShape& shape,
+                 const RunContext& context, std::vector<Vec2>& uv) {
   if (!table.exact.empty()) {
     throw InputError(
         "fit.plan.relaxation_rounds: exact points need their (u,v), and those around them, as they "
         "are; write relaxation_rounds: 0, or leave the column exact out");
   }
-  MovedUv moved = MoveToFeet(ShapeFor(options), {table.positions, uv, table.weights}, triangles,
+  MovedUv moved = MoveToFeet(shape, {table.positions, uv, table.weights}, triangles,
                              std::get<AutoPlan>(options.fit.plan), context);
   uv = std::move(moved.uv);
   return moved.moves;
 }
 
+// ------------------------------------------------------------- points that are left out
+
+// The coordinates of points along an axis, ascending, with the points' indices.
+using Along = std::vector<std::pair<double, std::size_t>>;
+
+// The number of points that may be strays.
+std::size_t MostStrays(std::size_t count) { return std::max<std::size_t>(count / 50, 1); }
+
+// The range of all coordinates but the outermost that may be strays.
+double InnerRange(std::span<const std::pair<double, std::size_t>> along) {
+  const std::size_t outer = MostStrays(along.size());
+  return along.size() > 2 * outer ? along[along.size() - 1 - outer].first - along[outer].first : 0;
+}
+
+// The first of several points with one value beyond all others, such as -9999 or 0 for no data; the
+// size if there are none. widest: the widest inner range of the other axes.
+std::size_t FindOneValue(const Along& along, double widest) {
+  constexpr double kFar = 2;  // inner ranges between the value and the others
+  std::size_t first = along.empty() ? 0 : along.size() - 1;
+  while (first > 0 && along[first - 1].first == along.back().first) {
+    --first;
+  }
+  if (along.size() - first < 2 || first < along.size() / 2 || first == 0) {
+    return along.size();
+  }
+  const double range = std::max(widest, InnerRange(std::span(along).first(first)));
+  return along[first].first - along[first - 1].first > kFar * range ? first : along.size();
+}
+
+// The first of a few points beyond a gap; the size if there are none.
+std::size_t FindFew(const Along& along, double widest) {
+  constexpr double kFar = 3, kFarOfWidest = 1.5;  // inner ranges, of this axis and of any
+  const double range = InnerRange(along),
+               gap = std::max(kFar * range, kFarOfWidest * std::max(widest, range));
+  const std::size_t count = along.size(), most = std::min(MostStrays(count) + 1, count);
+  for (std::size_t k = count - most; k + 1 < count; ++k) {
+    if (along[k + 1].first - along[k].first > gap) {
+      return k + 1;
+    }
+  }
+  return count;
+}
+
+// Finds points far beyond all others along a coordinate axis. They would squeeze the others into a
+// corner of (u,v).
+class StraySearch {
+ public:
+  // left_out: per point; the flags of strays are set.
+  StraySearch(std::span<const Vec3> positions, std::vector<char>& left_out)
+      : positions_(positions), left_out_(left_out) {}
+
+  void Run() {
+    for (int round = 0; round < 2 && HasFarPoints(); ++round) {  // one kind may hide the other
+      Flag(FindOneValue);
+      Flag(FindFew);
+    }
+  }
+
+ private:
+  // Returns whether some point is so far from the quartiles of a sample that a search may find it.
+  bool HasFarPoints() const {
+    constexpr std::size_t kSample = 10000;
+    constexpr double kFar = 2.5;  // distances between quartiles, the widest
+    Vec3 low = Vec3::Zero(), high = Vec3::Zero(), beyond = Vec3::Zero();
+    for (int axis = 0; axis < 3; ++axis) {
+      const Along along = SortedAlong(axis, std::max<std::size_t>(positions_.size() / kSample, 1));
+      if (along.empty()) {
+        return false;
+      }
+      low[axis] = along[along.size() / 4].first;
+      high[axis] = along[along.size() * 3 / 4].first;
+    }
+    for (std::size_t k = 0; k < positions_.size(); ++k) {
+      if (left_out_[k] == 0) {
+        beyond = beyond.cwiseMax(low - positions_[k]).cwiseMax(positions_[k] - high);
+      }
+    }
+    return beyond.maxCoeff() > kFar * (high - low).maxCoeff();
+  }
+
+  Along SortedAlong(int axis, std::size_t every) const {
+    Along along;
+    for (std::size_t k = 0; k < positions_.size(); k += every) {
+      if (left_out_[k] == 0) {
+        along.emplace_back(positions_[k][axis], k);
+      }
+    }
+    std::sort(along.begin(), along.end());
+    return along;
+  }
+
+  // Flags the points that `find` finds at either end of an axis.
+  template <class Find>
+  void Flag(const Find& find) {
+    std::array<Along, 3> along;
+    Vec3 range;
+    for (int axis = 0; axis < 3; ++axis) {
+      along[axis] = SortedAlong(axis, 1);
+      range[axis] = InnerRange(along[axis]);
+    }
+    for (int axis = 0; axis < 3; ++axis) {
+      const double widest = std::max(range[(axis + 1) % 3], range[(axis + 2) % 3]);
+      for (int end = 0; end < 2; ++end) {
+        for (std::size_t k = find(along[axis], widest); k < along[axis].size(); ++k) {
+          left_out_[along[axis][k].second] = 1;
+        }
+        std::ranges::reverse(along[axis]);
+        std::ranges::for_each(along[axis], [](auto& entry) { entry.first *= -1; });
+      }
+    }
+  }
+
+  std::span<const Vec3> positions_;
+  std::vector<char>& left_out_;
+};
+
+template <class Value>
+void Keep(std::span<const char> left_out, std::vector<Value>& values) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (left_out[k] == 0) {
+      values[kept++] = values[k];
+    }
+  }
+  values.resize(kept);
+}
+
+// Takes the points out of the table, with the triangles at them.
+void TakeOut(std::span<const char> left_out, PointTable& table) {
+  std::vector<std::int32_t> number(left_out.size());
+  std::int32_t kept = 0;
+  for (std::size_t k = 0; k < left_out.size(); ++k) {
+    number[k] = left_out[k] == 0 ? kept++ : -1;
+  }
+  Keep(left_out, table.positions);
+  Keep(left_out, table.uv);
+  Keep(left_out, table.weights);
+  for (Triangle& triangle : table.triangles) {
+    std::ranges::for_each(triangle, [&](std::int32_t& corner) { corner = number[corner]; });
+  }
+  std::erase_if(table.triangles, [](const Triangle& t) { return std::ranges::min(t) < 0; });
+  for (std::uint32_t& point : table.exact) {
+    point = static_cast<std::uint32_t>(number[point]);
+  }
+}
+
+// The points that take no part in the fit.
+struct PointsOut {
+  std::vector<char> left_out;         // per given point
+  std::vector<std::uint32_t> strays;  // ascending
+  std::size_t not_finite = 0;
+  std::vector<std::uint32_t> given =
+      {};  // given indices of the points that take part, if not all do
+
+  bool Any() const { return not_finite + strays.size() > 0; }
+};
+
+PointsOut LeaveOut(PointTable& table, bool uv_given) {
+  PointsOut out{.left_out = std::vector<char>(table.positions.size(), 0), .strays = {}};
+  for (std::size_t k = 0; k < table.positions.size(); ++k) {
+    out.left_out[k] = table.positions[k].allFinite() ? 0 : 1;
+    out.not_finite += out.left_out[k];
+  }
+  std::vector<char> far = out.left_out;
+  if (!uv_given && table.exact.empty()) {
+    StraySearch(table.positions, far).Run();
+  }
+  for (std::uint32_t k = 0; k < far.size(); ++k) {
+    if (far[k] != out.left_out[k]) {
+      out.strays.push_back(k);
+    }
+    out.left_out[k] = far[k];
+  }
+  for (const std::uint32_t point : table.exact) {
+    if (out.left_out[point] != 0) {
+      throw InputError(
+          fmt::format("{} is exact and not finite; give its coordinates", PointName(table, point)));
+    }
+  }
+  if (out.Any()) {
+    for (std::uint32_t k = 0; k < far.size(); ++k) {
+      if (far[k] == 0) {
+        out.given.push_back(k);
+      }
+    }
+    TakeOut(out.left_out, table);
+  }
+  return out;
+}
+
+// ------------------------------------------------------------------ (u,v) and level 0
+
+// The sides of the domain in space; NaN where they are not known.
+Vec2 SidesOf(const Parametrisation& parameters, std::span<const Vec3> positions, Closure closure) {
+  constexpr double kMostSlant = 0.5;  // cosine, beyond which (u,v) in other units bend the sides
+  if (closure != Closure::kOpen || parameters.source != ParameterSource::kGiven) {
+    return parameters.lengths_mm;
+  }
+  const HSplineShape one{.patches_u = 1, .patches_v = 1, .max_level = 0};
+  const SurfaceFrame frame = StartSurface(one, positions, parameters.uv).Frame({0.5, 0.5});
+  const double slant = std::abs(frame.du.dot(frame.dv)) / (frame.du.norm() * frame.dv.norm());
+  return slant < kMostSlant ? Vec2(frame.du.norm(), frame.dv.norm()) : Vec2::Constant(kNaN);
+}
+
+// The shape with about as many patches of level 0, which are square in a domain with these sides.
+// points: their number; a long strip gets more patches if they allow it.
+HSplineShape BySides(HSplineShape shape, const Vec2& sides_mm, std::size_t points) {
+  constexpr double kMostLong = 3;  // of a patch, relative to its width
+  constexpr double kPointsPerPatch = 6;
+  const double longer = sides_mm.x() / shape.patches_u / (sides_mm.y() / shape.patches_v);
+  if (shape.ClosedU() || !(longer > kMostLong || longer < 1 / kMostLong)) {
+    return shape;
+  }
+  const double patches = static_cast<double>(shape.patches_u) * shape.patches_v,
+               aspect = sides_mm.x() / sides_mm.y(), most = kMaxPatches >> shape.max_level;
+  const auto along = [&](double ratio) {
+    const double in_strip = std::min(ratio, static_cast<double>(points) / kPointsPerPatch);
+    const double count = ratio > patches ? std::max(patches, in_strip) : std::sqrt(patches * ratio);
+    return static_cast<int>(std::clamp(std::round(count), 1.0, most));
+  };
+  shape.patches_u = along(aspect);
+  shape.patches_v = along(1 / aspect);
+  return shape;
+}
+
+HSplineShape ShapeOver(const Parametrisation& parameters, const PointTable& table,
+                       const PointFitOptions& options) {
+  const HSplineShape shape = ShapeFor(options);
+  return options.patches_by_shape
+             ? BySides(shape, SidesOf(parameters, table.positions, options.closure),
+                       table.positions.size())
+             : shape;
+}
+
 struct PreparedPoints {
   Parametrisation parameters;
+  HSplineShape shape;
   std::optional<FootMoves> moves = {};
 };
 
-PreparedPoints PlacePoints(PointTable& table, const PointFitOptions& options, StepClock& step,
+PreparedPoints PlacePoints(PointTable& table, std::span<const std::uint32_t> given,
+                           const PointFitOptions& options, StepClock& step,
                            const RunContext& context) {
   if (const std::string fault = ClosureFault(options); !fault.empty()) {
     throw InputError("closure: " + fault);
   }
   const std::vector<Triangle> triangles = std::exchange(table.triangles, {});
   PreparedPoints placed{
-      step("parameters", [&] { return FindParameters(table, triangles, options); }), {}};
+      .parameters =
+          step("parameters", [&] { return FindParameters(table, triangles, given, options); }),
+      .shape = {}};
+  placed.shape = ShapeOver(placed.parameters, table, options);
   if (RelaxationRounds(options.fit) > 0) {
     placed.moves = step("relaxation", [&] {
-      return MoveUv(table, triangles, options, context, placed.parameters.uv);
+      return MoveUv(table, triangles, options, placed.shape, context, placed.parameters.uv);
     });
   }
   return placed;
@@ -234,8 +481,23 @@ struct GivenPoints {
   std::vector<Vec2> exact_uv;
   Box3 box;
   bool has_uv = false;
+  bool on_line = false;  // heights alone, without places
   bool has_sigma = false;
 };
+
+bool LieOnLine(std::span<const Vec3> positions) {
+  constexpr double kNarrow = 1e-4;  // share of the mean squares across the line
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& p : positions) {
+    mean += p / static_cast<double>(positions.size());
+  }
+  Mat3 moments = Mat3::Zero();
+  for (const Vec3& p : positions) {
+    moments += (p - mean) * (p - mean).transpose();
+  }
+  const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>(moments).eigenvalues();
+  return squares[1] < kNarrow * squares[2];
+}
 
 GivenPoints KeepFacts(const PointTable& table, ParameterSource source,
                       std::span<const ExactPoint> exact) {
@@ -247,6 +509,7 @@ GivenPoints KeepFacts(const PointTable& table, ParameterSource source,
   for (const Vec3& p : table.positions) {
     given.box.extend(p);
   }
+  given.on_line = LieOnLine(table.positions);
   std::ranges::transform(exact, std::back_inserter(given.exact_uv), &ExactPoint::uv);
   return given;
 }
@@ -371,11 +634,29 @@ double ReachBeyond(const HSplineSurface& surface, const Box3& box) {
   return farthest / box.diagonal().norm();
 }
 
+// The RMS distance in diagonals of the box. Given (u,v) may be wrong for some points, which are
+// then outliers and do not count.
+double FindOff(const GivenPoints& given, const FitResult& fit) {
+  if (!given.has_uv) {
+    return fit.point_rms_mm / given.box.diagonal().norm();
+  }
+  if (given.on_line) {
+    return kNaN;
+  }
+  std::vector<double> distances;
+  for (std::uint32_t k = 0; k < fit.residual_mm.size(); ++k) {
+    if (!fit.automatic || !std::ranges::binary_search(fit.automatic->outliers, k)) {
+      distances.push_back(fit.residual_mm[k]);
+    }
+  }
+  return RootMeanSquare(distances) / given.box.diagonal().norm();
+}
+
 void CompareWithPoints(const GivenPoints& given, PointFit& result) {
   const std::optional<AutoReport>& report = result.fit.automatic;
   result.sigma_factor = given.has_sigma && report ? SigmaFactor(*report, given.weights) : kNaN;
   result.reach = ReachBeyond(result.fit.surface, given.box);
-  result.off = given.has_uv ? kNaN : result.fit.point_rms_mm / given.box.diagonal().norm();
+  result.off = FindOff(given, result.fit);
   result.distance = ComputeQuantiles(result.fit);
   SplitRms(given.weights, result);
 }
@@ -397,6 +678,95 @@ void ConvertWeights(std::span<const Term> terms, FitResult& fit) {
   for (LevelSummary& level : fit.levels) {
     level.auto_weight *= as_written;
   }
+}
+
+// Spreads values of the points that take part over all given points; NaN elsewhere.
+template <class Value>
+void SpreadBack(const PointsOut& out, const Value& none, std::vector<Value>& values) {
+  std::vector<Value> all(values.empty() ? 0 : out.left_out.size(), none);
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    all[out.given[n]] = values[n];
+  }
+  values = std::move(all);
+}
+
+// Brings the result to the order and the numbers of the given points.
+void RestoreOrder(const PointsOut& out, PointFit& result) {
+  result.strays = out.strays;
+  result.not_finite = out.not_finite;
+  if (!out.Any()) {
+    return;
+  }
+  SpreadBack(out, Vec2(Vec2::Constant(kNaN)), result.fit.uv);
+  SpreadBack(out, kNaN, result.fit.residual_mm);
+  SpreadBack(out, kNaN, result.sigma_mm);
+  for (std::vector<double>& values : result.attribute_at) {
+    SpreadBack(out, kNaN, values);
+  }
+  if (result.fit.automatic) {
+    AutoReport& report = *result.fit.automatic;
+    for (std::vector<std::uint32_t>* const indices : {&report.outliers, &report.repeated}) {
+      std::ranges::for_each(*indices, [&](std::uint32_t& k) { k = out.given[k]; });
+    }
+    std::vector<std::uint32_t> outliers;
+    std::ranges::set_union(report.outliers, out.strays, std::back_inserter(outliers));
+    report.outliers = std::move(outliers);
+  }
+}
+
+std::string LeftOutText(const PointsOut& out) {
+  constexpr std::size_t kMostNamed = 5;
+  std::string named;
+  for (std::size_t n = 0; n < std::min(out.strays.size(), kMostNamed); ++n) {
+    named += fmt::format("{}{}", n > 0 ? ", " : "", out.strays[n] + 1);
+  }
+  return fmt::format(
+      "{} far beyond all others {} left out: {} {}{}", Counted(std::ssize(out.strays), "point"),
+      out.strays.size() == 1 ? "was" : "were", out.strays.size() == 1 ? "number" : "numbers", named,
+      out.strays.size() > kMostNamed ? ", ..." : "");
+}
+
+// States that the points lie in two places, if there is a wide gap along u or v.
+std::string GapText(std::vector<Vec2> uv) {
+  constexpr double kWideGap = 0.4;     // of the domain
+  constexpr std::size_t kOneIn = 100;  // points that lie beyond the gap at least
+  for (const int c : {0, 1}) {
+    std::ranges::sort(uv, {}, [&](const Vec2& p) { return p[c]; });
+    for (std::size_t k = uv.size() / kOneIn; k + uv.size() / kOneIn < uv.size(); ++k) {
+      if (k > 0 && uv[k][c] - uv[k - 1][c] > kWideGap) {
+        return fmt::format(
+            "the points lie in two places, with {:.0f} % of {} between them empty: nothing holds "
+            "the surface there; fit each place by itself for its detail",
+            100 * (uv[k][c] - uv[k - 1][c]), c == 0 ? "u" : "v");
+      }
+    }
+  }
+  return "";
+}
+
+// What was left out of the table, and what about the points looks doubtful.
+std::vector<std::string> FindNotes(const PointTable& table, const PointsOut& out,
+                                   const PreparedPoints& placed, const PointFitOptions& options) {
+  std::vector<std::string> notes = table.notes;
+  if (out.not_finite > 0) {
+    notes.push_back(fmt::format("{} without finite coordinates left out",
+                                Counted(static_cast<long long>(out.not_finite), "point")));
+  }
+  if (!out.strays.empty()) {
+    notes.push_back(LeftOutText(out));
+  }
+  if (const HSplineShape asked = ShapeFor(options); placed.shape != asked) {
+    notes.push_back(fmt::format(
+        "level 0 has {} x {} patches in place of {} x {}, by the shape of "
+        "the domain; patches_by_shape: false keeps them",
+        placed.shape.patches_u, placed.shape.patches_v, asked.patches_u, asked.patches_v));
+  }
+  if (options.closure == Closure::kOpen) {
+    if (std::string gap = GapText(placed.parameters.uv); !gap.empty()) {
+      notes.push_back(std::move(gap));
+    }
+  }
+  return notes;
 }
 
 PointFit BeginResult(PreparedPoints placed, FitResult fit, std::vector<PointAttribute> attributes) {
@@ -450,11 +820,18 @@ std::optional<ToleranceReport> CompareWithTolerance(const PointFitOptions& optio
 }
 
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context) {
-  std::vector<PointAttribute> attributes = TakeAttributes(table, options);
+  const bool uv_given = !table.uv.empty();
+  std::vector<PointAttribute> given_attributes = TakeAttributes(table, options);
+  const PointsOut out = LeaveOut(table, uv_given);
+  std::vector<PointAttribute> attributes = given_attributes;
+  for (PointAttribute& attribute : attributes) {
+    Keep(out.left_out, attribute.values);
+  }
   StepClock step(context);
-  PreparedPoints placed = PlacePoints(table, options, step, context);
+  PreparedPoints placed = PlacePoints(table, out.given, options, step, context);
+  std::vector<std::string> notes = FindNotes(table, out, placed, options);
   std::vector<Vec2>& uv = placed.parameters.uv;
-  const HSplineSurface start = StartSurface(ShapeFor(options), table.positions, uv);
+  const HSplineSurface start = StartSurface(placed.shape, table.positions, uv);
   CheckChord(options.chord_mm, start, {table.positions, uv}, context);
   std::vector<ExactPoint> exact = ExactPoints(table, uv);
   const GivenPoints given = KeepFacts(table, placed.parameters.source, exact);
@@ -470,6 +847,11 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
     AddSigma(given, start, step, result);
   }
   ConvertWeights(options.fit.terms, result.fit);
+  if (!result.attributes.empty()) {
+    result.attributes = std::move(given_attributes);
+  }
+  RestoreOrder(out, result);
+  result.notes = std::move(notes);
   result.times = step.Take();
   return result;
 }

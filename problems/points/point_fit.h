@@ -34,6 +34,7 @@ struct PointFitOptions {
   std::string title = "untitled";
   int patches_u = 8;
   int patches_v = 8;
+  bool patches_by_shape = true;
   Closure closure = Closure::kOpen;
   Parameters parameters;
   std::vector<std::string> attributes = {};
@@ -57,6 +58,11 @@ void Fields(Visitor& visit, PointFitOptions& o) {
         o.patches_u);
   visit(FieldInfo{.name = "patches_v", .min = 1, .max = kMaxPatches, .doc = "of level 0 along v"},
         o.patches_v);
+  visit(FieldInfo{.name = "patches_by_shape",
+                  .doc =
+                      "for a domain in whose shape these patches would be more than three times as "
+                      "long as wide: share about as many out so that they are square"},
+        o.patches_by_shape);
   visit(FieldInfo{.name = "closure",
                   .doc = "open; or periodic_u for surfaces that go round in u, as a tube does"},
         o.closure);
@@ -98,7 +104,8 @@ void Fields(Visitor& visit, PointFitOptions& o) {
 // is read.
 std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 
-// The quantities of all points are in the order of the table, outliers included.
+// The quantities of all points are in the order of the table, outliers included. Those of points
+// that were left out before the fit are NaN.
 struct PointFit {
   std::string parameters;  // a name of ParameterSource
   std::string how;         // the plane, axis or map in words; empty for given (u,v)
@@ -119,13 +126,17 @@ struct PointFit {
   // other plans than auto.
   double sigma_factor = kNaN;
   double reach = kNaN;  // how far the surface goes beyond the points' box, in diagonals of the box
-  double off = kNaN;  // RMS distance of the points in diagonals of the box, weighted; NaN for given
-                      // (u,v)
+  double off = kNaN;    // RMS distance of the points in diagonals of the box, weighted; for given
+                        // (u,v) without outliers, and NaN if the points lie on a line
+  std::vector<std::uint32_t> strays =
+      {};                               // left out before the fit, ascending: far from all others
+  std::size_t not_finite = 0;           // points without a place, left out before the fit
+  std::vector<std::string> notes = {};  // what was left out or looks doubtful, a sentence each
   std::vector<StepTime> times;
 
   // The reasons why the result cannot be used; empty if it can. Besides the faults of the fit
   // itself there are two: the surface goes three diagonals beyond the points, where nothing holds
-  // it; or points without given (u,v) lie a tenth of the diagonal from it, as on no single sheet.
+  // it; or the points lie a tenth of the diagonal from it, as on no single sheet.
   std::vector<std::string> Faults() const;
 };
 
@@ -134,9 +145,12 @@ struct PointFit {
 std::optional<ToleranceReport> CompareWithTolerance(const PointFitOptions& options,
                                                     const PointFit& result);
 
-// Throws InputError as Parametrise, StartSurface, Fit and FitAttributes do, for a closure that does
-// not suit the parameters, for attributes that the table lacks, for moves of (u,v) together with
-// exact points, and for a chord so fine that surface.ply would be too large (CheckChord).
+// Leaves out points that are not finite and, without given (u,v), strays: points far beyond all
+// others along x, y or z, either up to a fiftieth of the points or several with one value, such as
+// -9999. Strays count as outliers. Throws InputError as Parametrise, StartSurface, Fit and
+// FitAttributes do, for a closure that does not suit the parameters, for attributes that the table
+// lacks, for moves of (u,v) together with exact points, and for a chord so fine that surface.ply
+// would be too large (CheckChord).
 PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunContext& context);
 
 // The file of the points.

@@ -2,6 +2,7 @@
 #include "problems/points/point_table.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -14,6 +15,7 @@
 #include <utility>
 
 #include "surfaces/base/csv.h"
+#include "surfaces/base/lower_case.h"
 
 namespace semblance::problems {
 namespace {
@@ -26,6 +28,11 @@ using ColumnIndices = std::vector<std::optional<std::size_t>>;
 
 const std::optional<std::size_t>& IndexOf(const ColumnIndices& indices, PointColumn column) {
   return indices[static_cast<std::size_t>(column)];
+}
+
+// Returns whether the columns nx, ny and nz are normals of exact points.
+bool AreNormalsOfExact(const CsvReader& csv, FurtherColumns further) {
+  return further == FurtherColumns::kOfScanners || csv.Find("exact").has_value();
 }
 
 void CheckPairs(const CsvReader& csv, const ColumnIndices& indices) {
@@ -47,47 +54,107 @@ void CheckPairs(const CsvReader& csv, const ColumnIndices& indices) {
   }
 }
 
-// Refuses columns that are neither PointColumns nor attributes.
-void CheckNames(const CsvReader& csv, std::span<const std::string> attributes) {
-  for (const std::string& column : csv.Columns()) {
-    if (std::find(kNames.begin(), kNames.end(), column) == kNames.end() &&
-        std::find(attributes.begin(), attributes.end(), column) == attributes.end()) {
+// Returns whether scanners write a column of this name beside the coordinates.
+bool IsOfScanners(const std::string& column) {
+  static constexpr std::array<std::string_view, 15> kOfScanners = {
+      "r",         "g",     "b",     "a",    "red",      "green", "blue",          "alpha",
+      "intensity", "label", "class", "time", "gps_time", "range", "classification"};
+  return std::ranges::find(kOfScanners, LowerCase(column)) != kOfScanners.end();
+}
+
+// Returns the names of the columns without effect. Refuses columns that nothing explains.
+std::vector<std::string> FindFurther(const CsvReader& csv, const ColumnIndices& indices,
+                                     FurtherColumns further) {
+  std::vector<std::string> names;
+  for (std::size_t k = 0; k < csv.Columns().size(); ++k) {
+    const std::string& column = csv.Columns()[k];
+    if (std::ranges::find(indices, std::optional(k)) != indices.end()) {
+      continue;
+    }
+    if (further == FurtherColumns::kOfScanners && !IsOfScanners(column)) {
       csv.Fail(
           fmt::format("'{}' is not a column; the first line names the columns, which are x, y, z "
                       "and, if wanted, u, v, weight or sigma, exact, nx, ny, nz, and what the "
                       "option `attributes` names",
                       column));
     }
+    names.push_back(column);
+  }
+  return names;
+}
+
+std::string FurtherNote(const std::vector<std::string>& names) {
+  return names.empty() ? ""
+                       : fmt::format(
+                             "columns without effect: {0}; attributes: [{0}] fits numbers "
+                             "in them over the surface",
+                             fmt::join(names, ", "));
+}
+
+void AddNote(std::string note, PointTable& table) {
+  if (!note.empty()) {
+    table.notes.push_back(std::move(note));
   }
 }
 
-ColumnIndices IndicesIn(const CsvReader& csv, std::span<const std::string> attributes) {
-  CheckNames(csv, attributes);
+// Writes the names of the columns that have a meaning in small letters.
+std::string InSmallLetters(std::string_view first_line) {
+  std::string line(first_line);
+  for (std::size_t begin = 0, end = 0; begin < line.size(); begin = end + 1) {
+    end = std::min(line.find(',', begin), line.size());
+    const std::string small = LowerCase(line.substr(begin, end - begin));
+    const std::size_t first = small.find_first_not_of(" \t\r\"\xEF\xBB\xBF"),
+                      last = small.find_last_not_of(" \t\r\"");
+    if (first != small.npos && first <= last &&
+        std::ranges::find(kNames, std::string_view(small).substr(first, last + 1 - first)) !=
+            kNames.end()) {
+      line.replace(begin, end - begin, small);
+    }
+  }
+  return line;
+}
+
+// The columns of a table: their meanings, and the names of those without effect.
+struct TableColumns {
+  ColumnIndices indices;
+  std::vector<std::string> further;
+};
+
+TableColumns ColumnsIn(const CsvReader& csv, std::span<const std::string> attributes,
+                       FurtherColumns further) {
   ColumnIndices indices;
   for (const std::string_view name : kNames) {
-    indices.push_back(csv.Find(name));
+    const bool is_other = name.starts_with('n') && !AreNormalsOfExact(csv, further);
+    indices.push_back(is_other ? std::nullopt : csv.Find(name));
   }
+  for (const std::string& attribute : attributes) {
+    indices.push_back(csv.Find(attribute));
+  }
+  const std::vector<std::string> without_effect = FindFurther(csv, indices, further);
   for (const std::size_t k : {0, 1, 2}) {
     if (!indices[k]) {
       csv.Fail(fmt::format("there is no column '{}'; x, y and z are needed", kNames[k]));
     }
   }
-  for (const std::string& attribute : attributes) {
-    indices.push_back(csv.Find(attribute));
-    if (!indices.back()) {
-      csv.Fail(
-          fmt::format("there is no column '{}', which the option `attributes` names", attribute));
+  for (std::size_t k = 0; k < attributes.size(); ++k) {
+    if (!indices[kPointColumns + k]) {
+      csv.Fail(fmt::format("there is no column '{}', which the option `attributes` names",
+                           attributes[k]));
     }
   }
   CheckPairs(csv, indices);
-  return indices;
+  return {std::move(indices), without_effect};
 }
 
 // Reads any allowed table, line by line.
 class PointReader {
  public:
-  PointReader(std::string_view text, std::string_view name, std::span<const std::string> attributes)
-      : csv_(text, name), indices_(IndicesIn(csv_, attributes)) {
+  PointReader(std::string_view text, std::string_view name, std::span<const std::string> attributes,
+              FurtherColumns further)
+      : csv_(text, name) {
+    TableColumns columns = ColumnsIn(csv_, attributes, further);
+    indices_ = std::move(columns.indices);
+    AddNote(FurtherNote(columns.further), table_);
     for (const std::string& attribute : attributes) {
       table_.attributes.push_back({attribute, {}});
     }
@@ -180,14 +247,17 @@ bool PointColumns::Has(PointColumn wanted) const {
 }
 
 PointColumns ReadPointColumns(std::string_view first_line, std::string_view name,
-                              std::span<const std::string> attributes) {
-  const CsvReader csv(first_line, name);
-  const ColumnIndices indices = IndicesIn(csv, attributes);
-  PointColumns columns{.kinds = std::vector<std::size_t>(csv.Columns().size()),
-                       .attributes = {attributes.begin(), attributes.end()}};
-  for (std::size_t k = 0; k < indices.size(); ++k) {
-    if (indices[k]) {
-      columns.kinds[*indices[k]] = k;
+                              std::span<const std::string> attributes, FurtherColumns further) {
+  const std::string line = InSmallLetters(first_line);
+  const CsvReader csv(line, name);
+  const TableColumns found = ColumnsIn(csv, attributes, further);
+  PointColumns columns{.kinds = {},
+                       .attributes = {attributes.begin(), attributes.end()},
+                       .note = FurtherNote(found.further)};
+  columns.kinds.assign(csv.Columns().size(), columns.Kinds());
+  for (std::size_t k = 0; k < found.indices.size(); ++k) {
+    if (found.indices[k]) {
+      columns.kinds[*found.indices[k]] = k;
     }
   }
   return columns;
@@ -213,8 +283,9 @@ PlainPoints::PlainPoints(PointColumns columns)
       has_weight_(columns_.Has(PointColumn::kWeight)),
       has_sigma_(columns_.Has(PointColumn::kSigma)),
       has_exact_(columns_.Has(PointColumn::kExact)),
-      values_(columns_.Kinds(), 0.0) {
+      values_(columns_.Kinds() + 1, 0.0) {
   table_.weights_of_sigma = has_sigma_;
+  AddNote(columns_.note, table_);
   for (const std::string& attribute : columns_.attributes) {
     table_.attributes.push_back({attribute, {}});
   }
@@ -288,11 +359,15 @@ bool PlainPoints::AddPoint() {
 }
 
 PointTable ParsePointTable(std::string_view text, std::string_view name,
-                           std::span<const std::string> attributes) {
+                           std::span<const std::string> attributes, FurtherColumns further) {
   const std::size_t end = std::min(text.find('\n'), text.size());
-  PlainPoints plain(ReadPointColumns(text.substr(0, end), name, attributes));
-  const bool is_plain = end < text.size() && plain.Add(text.substr(end + 1)) && plain.size() > 0;
-  return is_plain ? plain.Take() : PointReader(text, name, attributes).Read();
+  const std::string_view first_line = text.substr(0, end), rest = text.substr(end);
+  PlainPoints plain(ReadPointColumns(first_line, name, attributes, further));
+  if (!rest.empty() && plain.Add(rest.substr(1)) && plain.size() > 0) {
+    return plain.Take();
+  }
+  const std::string small = InSmallLetters(first_line).append(rest);
+  return PointReader(small, name, attributes, further).Read();
 }
 
 }  // namespace semblance::problems

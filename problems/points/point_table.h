@@ -30,6 +30,7 @@ struct PointTable {
   std::vector<std::uint32_t> exact;        // ascending indices of points to be met exactly
   std::vector<Vec3> exact_normals;         // one per exact point; zero leaves the normal free
   std::vector<Triangle> triangles;         // between the points, if the file has faces
+  std::vector<std::string> notes;          // what the reader left out, a sentence each
   std::string file = {};                   // name of the file in messages; empty without a file
   int first_line = 0;                      // line of the first point; 0 if points are not lines
 };
@@ -48,27 +49,35 @@ void AddExact(PointTable& table, std::size_t point, const Vec3& normal);
 // together:
 //   the normal of the surface at an exact point, of any length, or 0, 0, 0;
 // - the attributes.
-// Each further line has one decimal number per column. Throws IoError (`name:line: what`) for any
-// other column, a repeated column, an attribute without a column, a line with more or fewer
-// entries, an empty line before the end, an entry that is no finite number, a weight or sigma that
-// is not positive, an exact that is neither 0 nor 1, and a table without points.
+// The names may be in capitals. Colours, an intensity and other numbers that scanners write (such
+// as r, g, b, intensity) have no effect, which a note states; with FurtherColumns::kAny this holds
+// for every further column. Each further line has one decimal number per column. Throws IoError
+// (`name:line: what`) for any other column, a repeated column, an attribute without a column, a
+// line with more or fewer entries, an empty line before the end, an entry that is no finite number,
+// a weight or sigma that is not positive, an exact that is neither 0 nor 1, and a table without
+// points.
+enum class FurtherColumns { kOfScanners, kAny };
 PointTable ParsePointTable(std::string_view text, std::string_view name,
-                           std::span<const std::string> attributes = {});
+                           std::span<const std::string> attributes = {},
+                           FurtherColumns further = FurtherColumns::kOfScanners);
 
 enum class PointColumn { kX, kY, kZ, kU, kV, kWeight, kSigma, kExact, kNx, kNy, kNz };
 constexpr std::size_t kPointColumns = 11;
 
 // The meaning of each column of a table.
 struct PointColumns {
-  std::vector<std::size_t> kinds;  // a PointColumn, or kPointColumns + the index of an attribute
+  // A PointColumn, kPointColumns + the index of an attribute, or Kinds() for one without effect.
+  std::vector<std::size_t> kinds;
   std::vector<std::string> attributes;
+  std::string note = {};  // names the columns without effect; empty if there are none
 
   std::size_t Kinds() const { return kPointColumns + attributes.size(); }
   bool Has(PointColumn wanted) const;
 };
 // Reads the first line of a table. Throws as ParsePointTable.
 PointColumns ReadPointColumns(std::string_view first_line, std::string_view name,
-                              std::span<const std::string> attributes = {});
+                              std::span<const std::string> attributes = {},
+                              FurtherColumns further = FurtherColumns::kOfScanners);
 
 // The fast reader of tables as programs write them: bare decimal numbers with commas between them.
 // It gives up on anything else (blanks, quotes, a plus sign, numbers that are not finite, too many
