@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -55,8 +56,7 @@ void CheckArea(const TriMesh& mesh, const std::string& name) {
 }
 
 // The share of rays from all sides towards the mesh that hit the outside of a triangle first.
-double OutwardShare(const TriMesh& mesh) {
-  const MeshQuery query(mesh);
+double OutwardShare(const TriMesh& mesh, const MeshQuery& query) {
   const Box3 box = Bounds(mesh);
   const double radius = box.diagonal().norm();
   int outward_hits = 0, hits = 0;
@@ -71,6 +71,29 @@ double OutwardShare(const TriMesh& mesh) {
     }
   }
   return hits > 0 ? static_cast<double>(outward_hits) / hits : kNaN;
+}
+
+// The share of the surface with another sheet within 0.25 mm that faces the same way.
+double DoubledShare(const TriMesh& mesh, const MeshQuery& query) {
+  constexpr double kNear_mm = 0.25;
+  constexpr std::size_t kSamples = 400;
+  const std::size_t step = mesh.triangles.size() / kSamples + 1;
+  int samples = 0, doubled = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); t += step) {
+    const Triangle& own = mesh.triangles[t];
+    const Vec3 normal = TriangleAreaVector(mesh, own).normalized();
+    const auto is_other_sheet = [&](const MeshPoint& hit) {
+      const Triangle& other = mesh.triangles[hit.triangle];
+      return std::ranges::find_first_of(own, other) == own.end() &&
+             TriangleAreaVector(mesh, other).normalized().dot(normal) > 0.7;
+    };
+    samples += !normal.isZero();
+    doubled += !normal.isZero() &&
+               std::ranges::any_of(query.AllHits(TriangleCentroid(mesh, own) - kNear_mm * normal,
+                                                 normal, 2 * kNear_mm),
+                                   is_other_sheet);
+  }
+  return samples > 0 ? static_cast<double>(doubled) / samples : 0;
 }
 
 }  // namespace
@@ -91,7 +114,8 @@ std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& n
                 "multiply by {}, or say its unit (subject.units)");
   CheckPlace(mesh, name);
   CheckArea(mesh, name);
-  const double outward = OutwardShare(mesh);
+  const MeshQuery query(mesh);
+  const double outward = OutwardShare(mesh, query);
   if (outward < 0.5) {
     throw InputError(
         fmt::format("{}: {:.0f} % of its outside shows triangles' backs: the mesh is inside out; "
@@ -105,6 +129,13 @@ std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& n
       notes.push_back(fmt::format("{}: {} of {} edges {}", name, count, edges.edges, what));
     }
   };
+  constexpr double kMostDoubled = 0.3;
+  if (const double doubled = DoubledShare(mesh, query); doubled > kMostDoubled) {
+    notes.push_back(fmt::format(
+        "{}: {:.0f} % of its surface has a second sheet within 0.25 mm that faces the same way, as "
+        "if it held two versions of one surface; keep one of them, or a face may lie too far out",
+        name, 100 * doubled));
+  }
   note(edges.boundary, "are open borders");
   note(edges.non_manifold, "are non-manifold");
   note(edges.inconsistent, "join triangles of opposite orientation");

@@ -21,7 +21,8 @@ void CheckHeadSize(double longest_mm, const std::string& name, const std::string
 // lies more than 100 m from the origin, or is inside out, and if its longest side is not that of a
 // head in mm (the message guesses the unit). Inside out means that most rays from far outside hit
 // the back of a triangle first; the mesh is never turned silently. Returns one line for each lesser
-// defect of real scans: open, non-manifold or inconsistent edges.
+// defect of real scans: open, non-manifold or inconsistent edges, a surface that is there twice.
+// JoinCopies (join_copies.h) comes first.
 std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& name);
 
 }  // namespace semblance::surfaces
