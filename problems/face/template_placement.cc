@@ -14,8 +14,10 @@
 #include "fitting/problem/placement.h"
 #include "interp/dowels/dowel.h"
 #include "problems/face/head_formula.h"
+#include "problems/subject/input_mistakes.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 #include "surfaces/base/thin_plate.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -176,6 +178,29 @@ void CheckScale(double scale, const std::string& name) {
                   name, scale, kSmallestScale, kLargestScale, guess));
 }
 
+// Throws if a forgotten conversion lays the landmarks on the skin.
+void CheckFrame(const std::vector<SkinLandmark>& points, const MeshQuery& skin, const Vec3& middle,
+                const std::string& name) {
+  std::vector<Vec3> at;
+  for (const SkinLandmark& landmark : points) {
+    at.push_back(landmark.point);
+  }
+  std::vector<double> mm;
+  for (const Vec3& p : at) {
+    mm.push_back(skin.Closest(p).distance_mm);
+  }
+  if (UpperMedian(mm) <= kMaxPlacement_mm) {
+    return;  // a few landmarks are wrong, not their frame
+  }
+  const auto same_size = [](const FrameChange& change) { return change.factor == 1; };
+  if (const auto found = FindForgottenChange(at, skin, middle, kMaxPlacement_mm / 2, same_size)) {
+    throw InputError(fmt::format(
+        "{}: its landmarks do not lie on it; {} they fit within {:.1f} mm (median): bring both "
+        "into one frame (LPS)",
+        name, found->change.what, found->median_mm));
+  }
+}
+
 std::vector<SkinLandmark> MoveToSkin(const std::vector<SkinLandmark>& points, const TriMesh& skin,
                                      const std::string& name) {
   const MeshQuery query(skin);
@@ -183,6 +208,7 @@ std::vector<SkinLandmark> MoveToSkin(const std::vector<SkinLandmark>& points, co
   for (const SkinLandmark& landmark : points) {
     const MeshPoint nearest = query.Closest(landmark.point);
     if (!(nearest.distance_mm <= kMaxPlacement_mm)) {
+      CheckFrame(points, query, Bounds(skin).center(), name);
       throw InputError(
           fmt::format("{}: landmark '{}' is {:.1f} mm from the outer skin, and at most {} mm are "
                       "allowed; correct its point, or check that landmarks and mesh share one "

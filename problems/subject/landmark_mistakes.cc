@@ -33,46 +33,6 @@ std::vector<SitePoint> StandardFirst(const LandmarkFile& file) {
   return sites;
 }
 
-// A conversion of the points that people forget.
-struct Change {
-  std::string what, remedy;
-  std::function<Vec3(const Vec3&)> apply;
-  double factor = 1;  // by which it enlarges the skull
-};
-
-std::vector<Change> ForgottenChanges(const TriMesh& skull) {
-  const char* const kRas =
-      "one of the files is RAS and the other LPS; write `axes: RAS` for the one that is RAS, in "
-      "the "
-      "landmark file or under `subject`";
-  std::vector<Change> changes = {
-      {"x and y negated", kRas, [](const Vec3& p) { return Vec3(-p.x(), -p.y(), p.z()); }}};
-  for (const auto& [unit, name] :
-       {std::pair(LengthUnit::kCentimetre, "cm"), std::pair(LengthUnit::kInch, "in"),
-        std::pair(LengthUnit::kMetre, "m")}) {
-    const double factor = Millimetres(unit);
-    changes.push_back(
-        {fmt::format("multiplied by {}", factor),
-         fmt::format("the landmark file is not in mm; write `units: {}` in it (in YAML, which "
-                     "`semblance landmarks convert` writes)",
-                     name),
-         [factor](const Vec3& p) { return Vec3(factor * p); }, factor});
-  }
-  const Vec3 middle = Bounds(skull).center();
-  for (int axis = 0; axis < 3; ++axis) {
-    for (const double about : {0.0, middle[axis]}) {
-      changes.push_back(
-          {fmt::format("{} mirrored{}", "xyz"[axis], about == 0 ? "" : " at the skull's middle"),
-           "either the landmarks or the skull is a mirror image; take both from the same volume",
-           [axis, about](Vec3 p) {
-             p[axis] = 2 * about - p[axis];
-             return p;
-           }});
-    }
-  }
-  return changes;
-}
-
 class MistakeSearch {
  public:
   MistakeSearch(const LandmarkFile& file, const TriMesh& skull, const MeshQuery& query,
@@ -90,7 +50,7 @@ class MistakeSearch {
     }
   }
 
-  LandmarkMistakes Run() {
+  InputMistakes Run() {
     if (FindSamePoints()) {
       return std::move(found_);
     }
@@ -141,25 +101,47 @@ class MistakeSearch {
     return !found_.errors.empty();
   }
 
-  double MedianDistanceAfter(const Change& change) const {
-    std::vector<double> air_mm;
+  std::optional<FoundChange> BestChange() const {
+    std::vector<Vec3> points;
     for (const SitePoint& s : sites_) {
-      air_mm.push_back(query_.Closest(change.apply(s.point)).distance_mm);
+      points.push_back(s.point);
     }
-    return UpperMedian(air_mm);
+    return FindForgottenChange(
+        points, query_, Bounds(skull_).center(), options_.max_distance_mm,
+        [this](const FrameChange& change) { return HasSkullSize(change.factor); });
   }
 
-  std::optional<Change> BestChange() const {
-    std::optional<Change> best;
-    double least_mm = options_.max_distance_mm;
-    for (const Change& change : ForgottenChanges(skull_)) {
-      const double mm = HasSkullSize(change.factor) ? MedianDistanceAfter(change) : kNaN;
-      if (mm < least_mm) {
-        least_mm = mm;
-        best = change;
-      }
+  // Says which of the two files is in another frame or unit. skull = change(landmarks).
+  std::string Remedy(const FrameChange& change) const {
+    if (change.mirrored) {
+      return "either the landmarks or the skull is a mirror image; take both from the same volume";
     }
-    return best;
+    std::string remedy;
+    if (change.factor != 1) {
+      const char* const unit = change.factor == Millimetres(LengthUnit::kCentimetre) ? "cm"
+                               : change.factor == Millimetres(LengthUnit::kInch)     ? "in"
+                                                                                     : "m";
+      remedy = fmt::format(
+          "the landmark file is not in mm; write `units: {}` in it (in YAML, which `semblance "
+          "landmarks convert` writes)",
+          unit);
+    }
+    if (change.turned) {
+      remedy += (remedy.empty() ? "" : "; ") + FrameRemedy(change.linear / change.factor);
+    }
+    return remedy;
+  }
+
+  std::string FrameRemedy(const Mat3& skull_from_landmarks) const {
+    if (skull_from_landmarks == Mat3(Vec3(-1, -1, 1).asDiagonal())) {
+      return "one of the files is RAS and the other LPS; write `axes: RAS` for the one that is "
+             "RAS, in the landmark file or under `subject`";
+    }
+    const bool landmarks_are_lps =
+        FindPoseAxes(fit_->skull_from_average.rotation) == PoseAxes::kLps;
+    return landmarks_are_lps
+               ? "the landmarks are LPS, and the skull " + DescribeFrame(skull_from_landmarks)
+               : "the landmark file " + DescribeFrame(skull_from_landmarks.inverse());
   }
 
   bool HasSkullSize(double factor = 1) const {
@@ -181,9 +163,9 @@ class MistakeSearch {
                           far, sites_.size(), options_.max_distance_mm, UpperMedian(air_mm))
             : fmt::format("the sites are those of a skull of {:.3f} times the usual size",
                           fit_->skull_from_average.scale);
-    if (const std::optional<Change> change = BestChange()) {
-      return Error("{}; {} they fit within {:.1f} mm (median): {}", where, change->what,
-                   MedianDistanceAfter(*change), change->remedy);
+    if (const std::optional<FoundChange> found = BestChange()) {
+      return Error("{}; {} they fit within {:.1f} mm (median): {}", where, found->change.what,
+                   found->median_mm, Remedy(found->change));
     }
     return in_air &&
            Error("{}; check that landmarks and skull share one frame and one unit", where);
@@ -226,10 +208,14 @@ class MistakeSearch {
           fit_->median_mm);
     }
     const Vec3 front = turned * Vec3(0, -1, 0), up = turned * Vec3(0, 0, 1);
+    const bool y_up = up.y() > 0.8 && front.z() > 0.8;
     return Error(
         "the face looks to ({:.1f}, {:.1f}, {:.1f}) and its top to ({:.1f}, {:.1f}, {:.1f}); turn "
-        "skull, skin and landmarks so that it looks to -y and its top to +z (LPS)",
-        front.x(), front.y(), front.z(), up.x(), up.y(), up.z());
+        "skull, skin and landmarks so that it looks to -y and its top to +z (LPS){}",
+        front.x(), front.y(), front.z(), up.x(), up.y(), up.z(),
+        y_up ? "; this is y up, as Blender writes OBJ by default: export with `Forward: Y` and "
+               "`Up: Z`"
+             : "");
   }
 
   bool HasOpenMandible() {
@@ -327,15 +313,15 @@ class MistakeSearch {
   std::string label_;
   std::vector<double> air_mm_;  // distance of each site from the bone
   std::optional<SkullFit> fit_;
-  LandmarkMistakes found_;
+  InputMistakes found_;
 };
 
 }  // namespace
 
 double SamePoint_mm(const Box3& extent) { return std::min(0.5, 0.002 * extent.diagonal().norm()); }
 
-LandmarkMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
-                                      const MeshQuery& query, const PlaceOptions& options) {
+InputMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
+                                   const MeshQuery& query, const PlaceOptions& options) {
   return MistakeSearch(file, skull, query, options).Run();
 }
 

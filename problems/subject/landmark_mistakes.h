@@ -3,18 +3,11 @@
 // the likely remedy. Nothing is corrected here.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "problems/subject/dowel_placement.h"
+#include "problems/subject/input_mistakes.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {
-
-struct LandmarkMistakes {
-  std::vector<std::string> errors;  // one line each; a subject with one cannot be used
-  std::vector<std::string> notes;   // findings that may be intended
-};
 
 // The distance below which two landmarks count as one point: 0.5 mm, or 0.2 % of the diagonal of
 // `extent`, the box of all landmarks, if that is less. The latter is for files in metres, where all
@@ -25,8 +18,9 @@ double SamePoint_mm(const Box3& extent);
 // search.
 //   same point      Sites lie within SamePoint_mm of each other.
 //   another frame   More than half of the sites are farther than max_distance_mm from the bone, or
-//                   their size is not that of a skull. Tries whether negated axes or another unit
-//                   would lay them on the bone (median distance at most max_distance_mm).
+//                   their size is not that of a skull. Tries whether a forgotten conversion
+//                   (input_mistakes.h) would lay them on the bone (median distance at most
+//                   max_distance_mm).
 //   sides swapped   The mirrored average skull fits and the average skull does not (median residual
 //                   at most 12 mm, and at most 0.6 times the other). Either _l and _r are exchanged
 //                   or the volume is mirrored; the two look alike.
@@ -38,7 +32,7 @@ double SamePoint_mm(const Box3& extent);
 //                   listed as absent and no bone is near.
 //   in the air      A site is farther than max_distance_mm from the bone.
 // With fewer than six standard sites only `same point` and `in the air` are checked.
-LandmarkMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
-                                      const MeshQuery& query, const PlaceOptions& options);
+InputMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
+                                   const MeshQuery& query, const PlaceOptions& options);
 
 }  // namespace semblance::problems

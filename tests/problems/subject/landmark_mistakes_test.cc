@@ -26,7 +26,7 @@ struct Subject {
   TriMesh skull;
 };
 
-LandmarkMistakes Find(const Subject& s) {
+InputMistakes Find(const Subject& s) {
   return FindLandmarkMistakes(s.file, s.skull, MeshQuery(s.skull), PlaceOptions{});
 }
 
@@ -190,7 +190,7 @@ TEST(LandmarkMistakes, EachHasItsMessage) {
         continue;  // specks of bone are not symmetric
       }
       mistake.make(subject);
-      const LandmarkMistakes found = Find(subject);
+      const InputMistakes found = Find(subject);
       ASSERT_EQ(found.errors.size(), mistake.lines)
           << mistake.name << ", " << subject.file.subject
           << (found.errors.empty() ? "" : ": " + found.errors.front());
