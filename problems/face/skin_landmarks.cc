@@ -74,19 +74,19 @@ void ReadCsv(const fs::path& file, SkinLandmarks& landmarks) {
   }
 }
 
-std::optional<double> SkinDepth(const Landmark& landmark) {
-  return landmark.depth_along_normal_mm ? landmark.depth_along_normal_mm
-                                        : landmark.depth_closest_mm;
+bool HasDepth(const Landmark& landmark) {
+  return landmark.depth_along_normal_mm || landmark.depth_closest_mm;
 }
 
 void ReadSkullLandmarks(const fs::path& file, SkinLandmarks& landmarks) {
-  LandmarkReading reading = ReadLandmarks(file);
+  ReadLandmarksOptions options;
+  options.place = PointsLieOn::kSkin;
+  LandmarkReading reading = ReadLandmarks(file, options);
   std::ranges::move(reading.notes, std::back_inserter(landmarks.notes));
   const LandmarkFile& skull = reading.file;
-  const bool on_skin = std::ranges::none_of(
-      skull.landmarks, [](const Landmark& landmark) { return SkinDepth(landmark).has_value(); });
+  const bool on_skin = std::ranges::none_of(skull.landmarks, HasDepth);
   for (const Landmark& landmark : skull.landmarks) {
-    const std::optional<double> depth_mm = SkinDepth(landmark);
+    const std::optional<double>& depth_mm = landmark.depth_along_normal_mm;
     if (on_skin) {
       landmarks.points.push_back({landmark.site, landmark.Position()});
     } else if (depth_mm && landmark.normal) {
@@ -94,8 +94,8 @@ void ReadSkullLandmarks(const fs::path& file, SkinLandmarks& landmarks) {
           {landmark.site, landmark.Position() + *depth_mm * Vec3(landmark.normal->data())});
     } else {
       landmarks.notes.push_back(
-          fmt::format("{}: site {} has no depth or no normal, so its skin point is not known; it "
-                      "was left out",
+          fmt::format("{}: site {} has no depth along a normal, so its skin point is not known; "
+                      "it was left out",
                       file.string(), DescribeSite(landmark.site)));
     }
   }

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <optional>
 #include <set>
 #include <utility>
@@ -318,6 +319,67 @@ void EraseWithoutDepth(const FillNotes& notes, std::vector<Dowel>& dowels) {
   }
 }
 
+// Turns or drops dowels with a depth to the closest skin.
+class SkinTurner {
+ public:
+  explicit SkinTurner(const ClosestSkin& closest) : closest_(closest) {}
+
+  // Depths of dropped dowels become NaN.
+  void Turn(std::vector<Dowel>& dowels, FillNotes& notes) {
+    for (Dowel& dowel : dowels) {
+      const Landmark* const at = closest_.landmarks.Find(dowel.site);
+      if (at != nullptr && !at->depth_along_normal_mm && at->depth_closest_mm &&
+          dowel.depth_mm == *at->depth_closest_mm) {
+        closest_.skin != nullptr ? TurnToClosest(dowel, notes) : DropIfInBone(dowel, notes);
+      }
+    }
+  }
+
+ private:
+  void TurnToClosest(Dowel& dowel, FillNotes& notes) {
+    if (!seen_) {
+      const TriMesh& skin = *closest_.skin;
+      seen_.emplace(Submesh(skin, SeenFromOutside(skin, closest_.threads)));
+    }
+    const MeshPoint nearest = seen_->Closest(dowel.base);
+    const double allowed_mm = kMaxOff_mm + kNoises * closest_.noise_mm;
+    if (!(std::abs(nearest.distance_mm - dowel.depth_mm) <= allowed_mm) ||
+        nearest.distance_mm == 0) {
+      Drop(fmt::format("the closest skin is {:.2f} mm away, and the landmark file has {:.2f} mm",
+                       nearest.distance_mm, dowel.depth_mm),
+           dowel, notes);
+      return;
+    }
+    const Vec3 direction = (nearest.position - dowel.base).normalized();
+    const double cosine = std::clamp(direction.dot(dowel.direction), -1.0, 1.0);
+    notes.Add(dowel.site,
+              fmt::format("site {}: its dowel points to the closest skin, {:.0f} degrees from the "
+                          "normal",
+                          DescribeSite(dowel.site), std::acos(cosine) * 180 / std::numbers::pi));
+    dowel.direction = direction;
+  }
+
+  void DropIfInBone(Dowel& dowel, FillNotes& notes) {
+    constexpr double kStart_mm = 1;  // beyond the roughness of bone
+    if (closest_.skull.FirstHit(dowel.base + kStart_mm * dowel.direction, dowel.direction,
+                                std::max(0.0, dowel.depth_mm - kStart_mm))) {
+      Drop(
+          "its normal points into the skull, and without a skin the direction of its depth is "
+          "not known",
+          dowel, notes);
+    }
+  }
+
+  static void Drop(const std::string& why, Dowel& dowel, FillNotes& notes) {
+    notes.Add(dowel.site, fmt::format("site {}: {}; dowel dropped", DescribeSite(dowel.site), why));
+    dowel.depth_mm = kNaN;
+  }
+
+  static constexpr double kMaxOff_mm = 3, kNoises = 3;
+  const ClosestSkin& closest_;
+  std::optional<MeshQuery> seen_;  // the outer skin, if a dowel needed it
+};
+
 void AddAllMeasured(const LandmarkFile& file, std::map<std::string, double>& known) {
   for (const Landmark& landmark : file.landmarks) {
     const auto depth_mm = MeasuredAt(file, landmark.site);
@@ -368,6 +430,17 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
     dowel.sd_mm = same->sd_mm;
   }
   EraseWithoutDepth(notes, all);
+  EraseWithoutDepth(notes, used);
+  return notes.Lines();
+}
+
+std::vector<std::string> TurnToSkin(const ClosestSkin& closest, std::vector<Dowel>& all,
+                                    std::vector<Dowel>& used) {
+  SkinTurner turner(closest);
+  FillNotes notes, of_all;
+  turner.Turn(used, notes);
+  turner.Turn(all, of_all);
+  EraseWithoutDepth(of_all, all);
   EraseWithoutDepth(notes, used);
   return notes.Lines();
 }

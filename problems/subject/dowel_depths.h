@@ -15,6 +15,7 @@
 #include "problems/subject/landmarks.h"
 #include "problems/subject/tissue_table.h"
 #include "surfaces/base/fields.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {
 
@@ -212,6 +213,23 @@ std::vector<std::string> FillDepths(const TissueOptions& options, const Landmark
 // Throws InputError for a site that is unknown or appears twice, and for a site in `measured`
 // without a measured depth.
 std::map<std::string, double> KnownDepths(const TissueGiven& given, const LandmarkFile& landmarks);
+
+// The surroundings of dowels whose depth was not measured along their normal.
+struct ClosestSkin {
+  const LandmarkFile& landmarks;
+  const TriMesh* skin = nullptr;  // null: not known
+  const MeshQuery& skull;
+  double noise_mm = 0;  // by which the dowels may have been moved from their landmarks
+  int threads = 1;
+};
+
+// A depth to the closest skin is no depth along the normal, which may point sideways or inwards.
+// Turns each dowel that has such a depth towards the closest skin that is seen from outside. Drops
+// it if that skin is not at this depth, within 3 mm and three times the noise. Without a skin a
+// dowel keeps its direction, unless it enters bone, which drops it. Notes concern `used` alone.
+// Throws InputError if no dowel is left.
+std::vector<std::string> TurnToSkin(const ClosestSkin& closest, std::vector<Dowel>& all,
+                                    std::vector<Dowel>& used);
 
 // The key of set_mm that applies to the site; empty if none does.
 std::string FindSetKey(const TissueOptions& options, const std::string& site);
