@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <map>
 #include <numbers>
 
 #include "surfaces/base/error.h"
@@ -178,6 +179,40 @@ void ForPointsOn(const TriMesh& mesh, double spacing_mm, const Visit& visit) {
   }
 }
 
+// Lids over the holes of a mesh: from the middle of each border, a triangle to each of its edges.
+TriMesh CoverHoles(const TriMesh& mesh) {
+  const std::vector<MeshEdge> border = BorderEdges(mesh);
+  std::map<std::int32_t, std::int32_t> parent;  // of a border's vertices; its root is its own
+  const auto root_of = [&](std::int32_t v) {
+    while (parent.at(v) != v) {
+      v = parent[v] = parent.at(parent.at(v));
+    }
+    return v;
+  };
+  for (const auto& [a, b] : border) {
+    parent.try_emplace(a, a);
+    parent.try_emplace(b, b);
+    parent[root_of(a)] = root_of(b);
+  }
+  std::map<std::int32_t, std::vector<MeshEdge>> borders;  // by root
+  for (const MeshEdge& edge : border) {
+    borders[root_of(edge[0])].push_back(edge);
+  }
+  TriMesh lids;
+  for (const auto& [root, edges] : borders) {
+    Vec3 middle = Vec3::Zero();
+    for (const auto& [a, b] : edges) {
+      middle += (mesh.points[a] + mesh.points[b]) / (2.0 * static_cast<double>(edges.size()));
+    }
+    for (const auto& [a, b] : edges) {
+      const auto first = static_cast<std::int32_t>(lids.points.size());
+      lids.points.insert(lids.points.end(), {middle, mesh.points[a], mesh.points[b]});
+      lids.triangles.push_back({first, first + 1, first + 2});
+    }
+  }
+  return lids;
+}
+
 std::vector<CutPlane> FindEnds(const TriMesh& skin) {
   std::vector<CutPlane> ends = FindCutPlanes(skin);
   const std::vector<CutPlane> lids = FindLids(skin);
@@ -202,7 +237,9 @@ OuterSkin FindOuterSkin(const TriMesh& skin, double probe_mm) {
   CheckSize(skin, probe_mm);
   OuterSkin result{std::vector<bool>(skin.points.size(), false), FindEnds(skin)};
   ProbeGrid grid(Bounds(skin), probe_mm, result.ends);
-  ForPointsOn(skin, probe_mm / 3, [&](const Vec3& p) { grid.KeepOff(p); });
+  for (const TriMesh& surface : {skin, CoverHoles(skin)}) {
+    ForPointsOn(surface, probe_mm / 3, [&](const Vec3& p) { grid.KeepOff(p); });
+  }
   grid.Flood();
   const std::vector<Vec3> normals = VertexNormals(skin);
   for (std::size_t v = 0; v < skin.points.size(); ++v) {
