@@ -2,33 +2,63 @@
 #include "problems/app/evaluate.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <charconv>
+#include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 
 #include "problems/experiment/case.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/run.h"
+#include "problems/subject/input_mistakes.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/mesh/join_copies.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance::problems {
 namespace {
 
-TriMesh ReadChecked(const std::filesystem::path& path) {
-  TriMesh mesh = ReadMesh(path);
+using Notes = std::vector<std::string>;
+
+// Throws the errors, and keeps the notes.
+void Accept(const InputMistakes& found, Notes& notes) {
+  if (!found.errors.empty()) {
+    throw InputError(fmt::format("evaluate: {}", fmt::join(found.errors, "\n")));
+  }
+  notes.insert(notes.end(), found.notes.begin(), found.notes.end());
+}
+
+// Checks that the landmarks, which lie on bone, are covered by the skin.
+void CheckSkin(const SkinInputs& inputs, Notes& notes) { Accept(FindSkinMistakes(inputs), notes); }
+
+LandmarkFile AsLandmarks(const std::map<std::string, Vec3>& points) {
+  LandmarkFile file;
+  for (const auto& [site, point] : points) {
+    Landmark& landmark = file.landmarks.emplace_back();
+    landmark.site = site;
+    landmark.MoveTo(point);
+  }
+  return file;
+}
+
+TriMesh ReadChecked(const std::filesystem::path& path, Notes& notes) {
+  TriMesh mesh = ReadMeshInLps(path, notes);
+  std::ranges::move(JoinCopies(mesh, path.filename().string()), std::back_inserter(notes));
   CheckHeadMesh(mesh, path.string());
   return mesh;
 }
 
-TriMesh ReadFace(const std::filesystem::path& path) {
+TriMesh ReadFace(const std::filesystem::path& path, Notes& notes) {
   return path.extension() == ".json" ? Tessellate(ReadHSpline(path), kFaceQuadsPerPatch).mesh
-                                     : ReadChecked(path);
+                                     : ReadChecked(path, notes);
 }
 
 // A true skin, with its scored region and the basis of the scores.
@@ -38,12 +68,15 @@ struct Truth {
   ScoreBasis basis;
 };
 
-Truth ReadTruthOfExperiment(const EvaluateOptions& options, const RunContext& context) {
+Truth ReadTruthOfExperiment(const EvaluateOptions& options, const RunContext& context,
+                            Notes& notes) {
   const auto experiment = ReadConfig<Experiment>(options.config, options.overrides);
   CheckNetworkNamed(experiment, options.config);
   Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment);
+  notes.insert(notes.end(), subject.notes.begin(), subject.notes.end());
   if (!options.truth.empty()) {
-    subject.skin = ReadChecked(options.truth);
+    subject.skin = ReadChecked(options.truth, notes);
+    CheckSkin({.skin = *subject.skin, .landmarks = AsLandmarks(subject.points)}, notes);
   }
   if (!subject.skin) {
     throw InputError(
@@ -66,7 +99,7 @@ std::vector<Dowel> MakeDowels(const LandmarkFile& file) {
   return dowels;
 }
 
-Truth ReadTruthFiles(const EvaluateOptions& options) {
+Truth ReadTruthFiles(const EvaluateOptions& options, Notes& notes) {
   if (options.truth.empty()) {
     throw InputError(
         "evaluate: there is nothing to compare the face with; name the mesh of the true skin after "
@@ -75,7 +108,7 @@ Truth ReadTruthFiles(const EvaluateOptions& options) {
   if (!options.overrides.empty()) {
     throw InputError("evaluate: --set changes a configuration; name it with --config");
   }
-  Truth truth{.skin = ReadChecked(options.truth), .scored = {}, .basis = {}};
+  Truth truth{.skin = ReadChecked(options.truth, notes), .scored = {}, .basis = {}};
   if (options.landmarks.empty()) {
     if (!options.exclude.empty()) {
       throw InputError("evaluate: --exclude names sites; give the landmarks with --landmarks");
@@ -83,11 +116,14 @@ Truth ReadTruthFiles(const EvaluateOptions& options) {
     truth.scored = AllScored(truth.skin);
     return truth;
   }
-  truth.basis = MakeScoreBasis(MakeDowels(ReadLandmarks(options.landmarks).file));
+  const LandmarkReading reading = ReadLandmarks(options.landmarks);
+  notes.insert(notes.end(), reading.notes.begin(), reading.notes.end());
+  truth.basis = MakeScoreBasis(MakeDowels(reading.file));
   if (!truth.basis.sites) {
     throw InputError(fmt::format("{}: fewer than three landmarks do not locate the face; add some",
                                  options.landmarks.string()));
   }
+  CheckSkin({.skin = truth.skin, .landmarks = reading.file}, notes);
   truth.scored =
       FindScoredSkin(truth.skin, *truth.basis.sites, {}, {}, {.exclude = options.exclude});
   return truth;
@@ -95,15 +131,17 @@ Truth ReadTruthFiles(const EvaluateOptions& options) {
 
 }  // namespace
 
-nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext& context) {
+nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext& context,
+                                std::vector<std::string>& notes) {
   if (!options.config.empty() && !(options.landmarks.empty() && options.exclude.empty())) {
     throw InputError(
         "evaluate: the configuration names landmarks and zones; leave --landmarks and --exclude "
         "out, or change it with --set");
   }
-  const TriMesh face = ReadFace(options.face);
-  const Truth truth =
-      options.config.empty() ? ReadTruthFiles(options) : ReadTruthOfExperiment(options, context);
+  const TriMesh face = ReadFace(options.face, notes);
+  const Truth truth = options.config.empty() ? ReadTruthFiles(options, notes)
+                                             : ReadTruthOfExperiment(options, context, notes);
+  Accept(FindFaceMistakes(face, truth.skin), notes);
   return ScoreToJson(CompareFaces(truth.skin, truth.scored.region, face, context),
                      MeasureDetails(truth.skin, truth.scored, truth.basis, face, context),
                      truth.scored);

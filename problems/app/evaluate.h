@@ -24,8 +24,10 @@ struct EvaluateOptions {
 // Returns the entry `face` of result.json. For the face.hspline.json and the configuration of a run
 // the numbers are identical to those of the run. Without configuration and landmarks the whole
 // truth is scored, because the region of the face is unknown. Throws InputError for files or
-// options that cannot be combined, IoError, and as Run does for the configuration.
-nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext& context);
+// options that cannot be combined, IoError, and as Run does for the configuration. `notes` receives
+// remarks on the files, a line each.
+nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext& context,
+                                std::vector<std::string>& notes);
 
 // Parses a site and a radius in mm, e.g. "zy_r=15". Throws InputError for any other form.
 ExcludedZone ParseZone(const std::string& text);

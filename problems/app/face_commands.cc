@@ -13,6 +13,7 @@
 #include "problems/app/exit_code.h"
 #include "problems/app/work_options.h"
 #include "problems/config/config.h"
+#include "problems/config/terminal_text.h"
 #include "problems/face/edit_script.h"
 #include "problems/face/hspline_prior.h"
 #include "problems/face/template_source.h"
@@ -89,7 +90,7 @@ int Edit(const FaceArguments& a) {
     files.push_back({a.inverse, WriteConfig(inverse)});
   }
   WriteFilesTogether(files);
-  fmt::print("{}: {} vertices changed\n", a.out, inverse.edits.size());
+  Tell("{}: {} vertices changed\n", a.out, inverse.edits.size());
   return kDone;
 }
 
@@ -100,7 +101,7 @@ int Export(const FaceArguments& a) try {
                              .chord_mm = a.chord_mm,
                              .threads = a.threads});
   WriteFileAtomically(a.out, bytes);
-  fmt::print("{}: {} bytes\n", a.out, bytes.size());
+  Tell("{}: {} bytes\n", a.out, bytes.size());
   return kDone;
 } catch (const InputError& error) {
   throw WithFileName(error, a.face);
@@ -109,7 +110,7 @@ int Export(const FaceArguments& a) try {
 int Store(const Feature& feature, const FaceArguments& a, std::span<const fs::path> given) {
   CheckFree(fs::path(a.library) / fmt::format("{}.json", feature.name), a, given);
   const fs::path path = StoreFeature(a.library, feature);
-  fmt::print("{}: {} vertices\n", path.string(), feature.offsets.size());
+  Tell("{}: {} vertices\n", path.string(), feature.offsets.size());
   return kDone;
 }
 
@@ -140,7 +141,7 @@ int ApplyCommand(const FaceArguments& a) {
     vertices += feature.offsets.size();
   }
   WriteHSpline(a.out, face);
-  fmt::print("{}: {} vertices given\n", a.out, vertices);
+  Tell("{}: {} vertices given\n", a.out, vertices);
   return kDone;
 }
 
@@ -151,7 +152,7 @@ int BlendCommand(const FaceArguments& a) {
   }
   const FeatureBlend blend = BlendFeatures(a.name, features, a.weights);
   for (const std::string& warning : blend.warnings) {
-    fmt::print(stderr, "warning: {}\n", warning);
+    Tell(stderr, "warning: {}\n", warning);
   }
   return Store(blend.feature, a, FeatureFiles(a));
 }
@@ -164,8 +165,8 @@ int MirrorCommand(const FaceArguments& a) {
 
 int ListCommand(const FaceArguments& a) {
   for (const auto& [name, feature] : ReadFeatureLibrary(a.library)) {
-    fmt::print("{}: {} vertices, {} x {} patches\n", name, feature.offsets.size(),
-               feature.shape.patches_u, feature.shape.patches_v);
+    Tell("{}: {} vertices, {} x {} patches\n", name, feature.offsets.size(),
+         feature.shape.patches_u, feature.shape.patches_v);
   }
   return kDone;
 }
@@ -192,7 +193,7 @@ int PriorCommand(const FaceArguments& a) {
       ModesOnTemplate(prior, on_template, face, a.level, a.prior.count, &misfit);
   const std::string bytes = HSplineModesToJson(modes);
   WriteFileAtomically(a.out, bytes);
-  fmt::print(
+  Tell(
       "{}: {} modes of level {}, {} bytes; from the mean {:.3f} mm RMS, from the modes {:.3f} mm "
       "RMS, at most {:.3f} mm\n",
       a.out, modes.modes.size(), modes.level, bytes.size(), on_template.rms_mm, misfit.rms_mm,

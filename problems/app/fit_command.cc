@@ -12,6 +12,7 @@
 #include "problems/app/work_options.h"
 #include "problems/config/config.h"
 #include "problems/config/config_binder.h"
+#include "problems/config/terminal_text.h"
 #include "problems/points/fit_report.h"
 #include "problems/points/point_files.h"
 #include "problems/points/point_fit.h"
@@ -63,20 +64,20 @@ int FitCommand(const FitArguments& arguments) {
   const std::vector<std::string> notes = WritePointFit(
       options, {.name = name, .sha256 = file.sha256}, result, folder.Files(), context);
   folder.Publish();
-  fmt::print("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
-             result.fit.residual_mm.size(), result.parameters,
-             result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
-             result.fit.point_rms_mm, result.distance.max_mm);
+  Tell("{} points, (u,v): {}; {} control vertices; RMS {:.4g} mm, largest {:.4g} mm\n",
+       result.fit.residual_mm.size(), result.parameters,
+       result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
+       result.fit.point_rms_mm, result.distance.max_mm);
   if (result.fit.automatic) {
-    fmt::print("{}", AutoText(*result.fit.automatic));
+    Tell("{}", AutoText(*result.fit.automatic));
   }
   for (const std::string& note : notes) {
-    fmt::print("{}\n", note);
+    Tell("{}\n", note);
   }
   if (const auto tolerance = CompareWithTolerance(options, result)) {
-    fmt::print("{}\n", ToleranceText(*tolerance));
+    Tell("{}\n", ToleranceText(*tolerance));
   }
-  fmt::print("folder: {}\n", folder.Root().string());
+  Tell("folder: {}\n", folder.Root().string());
   return PrintFaults(result.Faults());
 }
 

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdio>
 #include <filesystem>
+#include <iterator>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,6 +23,7 @@
 #include "problems/subject/propose/propose_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/mesh/join_copies.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance::problems {
@@ -39,7 +41,7 @@ struct LandmarkArguments {
 
 void PrintEach(const std::vector<std::string>& lines, const char* what) {
   for (const std::string& line : lines) {
-    fmt::print(stderr, "{}", ForTerminal(fmt::format("{}: {}\n", what, line)));
+    Tell(stderr, "{}: {}\n", what, line);
   }
 }
 
@@ -51,7 +53,7 @@ int Convert(const LandmarkArguments& a) {
   PrintEach(reading.notes, "note");
   PrintEach(LostContents(reading.file, a.out), "not kept in this kind of file");
   WriteFileAtomically(a.out, bytes);
-  fmt::print("{}: {} landmarks, mm, LPS\n", a.out, reading.file.landmarks.size());
+  Tell("{}: {} landmarks, mm, LPS\n", a.out, reading.file.landmarks.size());
   return kDone;
 }
 
@@ -71,7 +73,7 @@ int Page(const LandmarkArguments& a) {
   NewFolders made(a.out);
   WriteFilesTogether(files);
   made.Keep();
-  fmt::print("{}\n", page.string());
+  Tell("{}\n", page.string());
   return kDone;
 }
 
@@ -112,16 +114,15 @@ std::vector<ReferenceHead> ReadReferences(const ProposeArguments& a) {
   if (heads.empty()) {
     heads.push_back(PhantomReference(1));
     heads.push_back(PhantomReference(2));
-    fmt::print(
-        stderr,
-        "note: without --reference the references are phantoms, which have no orbits, arches or "
-        "teeth; a real skull with landmarks as --reference gives a much better proposal\n");
+    Tell(stderr,
+         "note: without --reference the references are phantoms, which have no orbits, arches or "
+         "teeth; a real skull with landmarks as --reference gives a much better proposal\n");
   }
   return heads;
 }
 
 void PrintDifferences(const ProposeArguments& a, const LandmarkFile& file) {
-  fmt::print("{}", FormatComparison(CompareProposal(InLpsMm(file), ReadLandmarks(a.compare).file)));
+  Tell("{}", FormatComparison(CompareProposal(InLpsMm(file), ReadLandmarks(a.compare).file)));
 }
 
 void WriteProposal(const ProposeArguments& a, const std::string& out, const LandmarkFile& file) {
@@ -131,7 +132,7 @@ void WriteProposal(const ProposeArguments& a, const std::string& out, const Land
   NewFolders made(fs::absolute(out).parent_path());
   WriteFileAtomically(out, bytes);
   made.Keep();
-  fmt::print(
+  Tell(
       "{}: {} sites proposed, {} absent, mm, {}. Check each on the skull and correct it; then "
       "set `proposed: false`\n",
       out, file.landmarks.size(), file.absent.size(), WrittenAxes(file, out));
@@ -158,8 +159,11 @@ int Propose(const ProposeArguments& a) {
   if (!a.quiet) {
     context.on_event = ProgressPrinter(stderr);
   }
-  const Proposal proposal =
-      ProposeLandmarks(ReadMesh(a.skull), a.skull, ReadReferences(a), context);
+  std::vector<std::string> notes;
+  TriMesh skull = ReadMeshInLps(a.skull, notes);
+  std::ranges::move(JoinCopies(skull, a.skull), std::back_inserter(notes));
+  const Proposal proposal = ProposeLandmarks(skull, a.skull, ReadReferences(a), context);
+  PrintEach(notes, "note");
   PrintEach(proposal.notes, "note");
   const LandmarkFile file = ProposalFile(proposal, fs::path(a.skull).stem().string());
   if (!a.compare.empty()) {

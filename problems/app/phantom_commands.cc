@@ -12,6 +12,7 @@
 
 #include "problems/app/exit_code.h"
 #include "problems/app/work_options.h"
+#include "problems/config/terminal_text.h"
 #include "problems/io/output_folder.h"
 #include "problems/io/staged_folder.h"
 #include "problems/io/volumes/itk_files.h"
@@ -62,7 +63,7 @@ void WriteVolumeFile(const CtVolume& volume, const std::string& name, VolumeForm
   const std::filesystem::path part = folder.Root() / ("part-" + name);
   WriteImageVolume(volume, part, format);
   std::filesystem::rename(part, folder.Root() / name);
-  fmt::print("{}: the CT in one file\n", name);
+  Tell("{}: the CT in one file\n", name);
 }
 
 int WritePhantom(const PhantomArguments& a) {
@@ -78,7 +79,7 @@ int WritePhantom(const PhantomArguments& a) {
   std::erase_if(landmarks.landmarks, [&](const Landmark& l) { return lost.Holds(l.Position()); });
   folder.Write("landmarks.yaml", EncodeLandmarks(landmarks, "landmarks.yaml"));
   folder.Write("true_skin.ply", EncodeMesh(phantom.face, ".ply"));
-  fmt::print(
+  Tell(
       "ct: {} DICOM slices of {} x {} voxels, {} x {} x {} mm\n"
       "landmarks.yaml: {} sites, with their true depths\n"
       "true_skin.ply: {} triangles\n",
@@ -88,7 +89,7 @@ int WritePhantom(const PhantomArguments& a) {
     WriteVolumeFile(volume, a.volume, *format, folder);
   }
   staged.Publish();
-  fmt::print("next: semblance import-ct {}\n", (staged.Root() / "ct").string());
+  Tell("next: semblance import-ct {}\n", (staged.Root() / "ct").string());
   return kDone;
 }
 

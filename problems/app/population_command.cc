@@ -57,7 +57,7 @@ PopulationRunSummary MeasureWithProgress(const PopulationPlan& plan, const fs::p
   options.shards = shard.count;
   if (!a.quiet) {
     options.on_progress = [](int done, int of, const std::string& name, const std::string& status) {
-      fmt::print(stderr, "{}", ForTerminal(fmt::format("{}/{} {}: {}\n", done, of, name, status)));
+      Tell(stderr, "{}/{} {}: {}\n", done, of, name, status);
     };
   }
   const RunContext context{.on_event = {},

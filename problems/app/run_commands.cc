@@ -22,6 +22,7 @@
 #include "problems/app/exit_code.h"
 #include "problems/app/program_end.h"
 #include "problems/app/work_options.h"
+#include "problems/config/terminal_text.h"
 #include "problems/experiment/case.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/input_files.h"
@@ -60,7 +61,7 @@ struct Arguments : WorkOptions {
 
 void PrintFaceError(const char* what, const FaceMetrics& m) {
   const DistanceSummary& s = m.truth_to_face;
-  fmt::print(
+  Tell(
       "{}: mean {:.2f} mm, RMS {:.2f} mm, median {:.2f} mm, p95 {:.2f} mm, within 2.5 mm {:.1f} % "
       "of {:.0f} cm² of true skin\n",
       what, s.mean_abs_mm, s.rms_mm, s.median_mm, s.p95_mm, 100 * s.within_2_5mm, s.area_cm2);
@@ -68,7 +69,7 @@ void PrintFaceError(const char* what, const FaceMetrics& m) {
 
 void PrintNotes(const std::vector<std::string>& notes) {
   for (const std::string& note : notes) {
-    fmt::print("note: {}\n", note);
+    Tell("note: {}\n", note);
   }
 }
 
@@ -123,11 +124,11 @@ int RunCommand(const Arguments& arguments) {
   folder.Publish();
   PrintNotes(result.Notes());
   if (result.truth) {
-    fmt::print("{}; closest-point distances\n", ToPhrase(result.truth->skin));
+    Tell("{}; closest-point distances\n", ToPhrase(result.truth->skin));
     PrintFaceError("first face", result.truth->implicit);
     PrintFaceError("recovered face", result.truth->face);
   }
-  fmt::print("report: {}\n", (folder.Root() / "report.html").string());
+  Tell("report: {}\n", (folder.Root() / "report.html").string());
   return PrintFaults(faults);
 }
 
@@ -142,7 +143,7 @@ int DepthCommand(const Arguments& arguments) {
   WriteDepth(experiment, result, folder.Files(), context);
   folder.Publish();
   PrintNotes(result.stage->subject.notes);
-  fmt::print("{}folder: {}\n", DepthText(result), folder.Root().string());
+  Tell("{}folder: {}\n", DepthText(result), folder.Root().string());
   return PrintFaults(result.Faults());
 }
 
@@ -269,13 +270,13 @@ CheckFindings CheckConfig(const std::string& file, const Arguments& arguments, I
 // Prints the findings and returns true if there was no fault.
 bool PrintFindings(const std::string& file, const CheckFindings& findings) {
   for (const std::string& warning : findings.warnings) {
-    fmt::print("{}: warning: {}\n", file, warning);
+    Tell("{}: warning: {}\n", file, warning);
   }
   for (const std::string& fault : findings.faults) {
-    fmt::print(stderr, "{}\n", Shortened(fmt::format("{}: {}", file, fault)));
+    Tell(stderr, "{}\n", Shortened(fmt::format("{}: {}", file, fault)));
   }
   if (findings.sound()) {
-    fmt::print("{}: no fault found\n", file);
+    Tell("{}: no fault found\n", file);
   }
   return findings.sound();
 }
@@ -295,10 +296,10 @@ int CheckCommand(const Arguments& arguments) {
     try {
       sound = PrintFindings(file, CheckConfig(file, arguments, inputs)) && sound;
     } catch (const ConfigError& error) {
-      fmt::print(stderr, "{}\n", Shortened(error.what()));
+      Tell(stderr, "{}\n", Shortened(error.what()));
       sound = false;
     } catch (...) {
-      fmt::print(stderr, "{}\n", DescribeFault(file, std::current_exception()));
+      Tell(stderr, "{}\n", DescribeFault(file, std::current_exception()));
       sound = false;
     }
   }
@@ -323,13 +324,13 @@ int OptionsCommand(const Arguments& arguments) {
 void WriteSkin(const TriMesh& skin, int dropped, OutputFolder& folder) {
   CheckHeadMesh(skin, "the imported skin");
   folder.Write("skin.ply", EncodeMesh(skin, ".ply"));
-  fmt::print("skin.ply: {} triangles; {} smaller pieces dropped\n", skin.triangles.size(), dropped);
+  Tell("skin.ply: {} triangles; {} smaller pieces dropped\n", skin.triangles.size(), dropped);
 }
 
 void WriteImport(const CtImport& import, OutputFolder& folder) {
   CheckHeadMesh(import.skull, "the imported skull");
   folder.Write("skull.ply", EncodeMesh(import.skull, ".ply"));
-  fmt::print("skull.ply: {} triangles\n", import.skull.triangles.size());
+  Tell("skull.ply: {} triangles\n", import.skull.triangles.size());
   WriteSkin(import.skin, import.dropped_skin, folder);
   PrintNotes(import.notes);
 }
@@ -366,9 +367,9 @@ int ImportCtCommand(const Arguments& arguments) {
   Import(arguments, reading, mr, folder.Files(), context);
   folder.Publish();
   const std::filesystem::path root = std::filesystem::absolute(folder.Root()).lexically_normal();
-  fmt::print("folder: {}\n", root.string());
+  Tell("folder: {}\n", root.string());
   if (!mr) {
-    fmt::print(
+    Tell(
         "next: pick landmarks on skull.ply (3D Slicer, MeshLab, CloudCompare; "
         "docs/tutorial/first-face.md), "
         "then\n  semblance landmarks convert PICKED {}\n",
@@ -385,8 +386,12 @@ int EvaluateCommand(const Arguments& arguments) {
                           .landmarks = arguments.landmarks,
                           .exclude = {}};
   std::ranges::transform(arguments.exclude, std::back_inserter(options.exclude), ParseZone);
-  const nlohmann::ordered_json score = Evaluate(options, MakeRunContext(arguments));
-  fmt::print("{}\n", score.dump(2));
+  std::vector<std::string> notes;
+  const nlohmann::ordered_json score = Evaluate(options, MakeRunContext(arguments), notes);
+  for (const std::string& note : notes) {
+    Tell(stderr, "note: {}\n", note);
+  }
+  Tell("{}\n", score.dump(2));
   return PrintFaults(std::isfinite(score.at("rms_mm").get<double>())
                          ? std::vector<std::string>()
                          : std::vector<std::string>{"the distance of the faces is not a number"});
@@ -412,7 +417,7 @@ int ReportCommand(const Arguments& arguments) {
   } else {
     WriteReport(folder);
   }
-  fmt::print("report: {}\n", (root / "report.html").string());
+  Tell("report: {}\n", (root / "report.html").string());
   return kDone;
 }
 

@@ -16,6 +16,7 @@
 
 #include "problems/app/exit_code.h"
 #include "problems/app/work_options.h"
+#include "problems/config/terminal_text.h"
 #include "problems/experiment/case.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/input_files.h"
@@ -26,6 +27,7 @@
 #include "problems/io/staged_folder.h"
 #include "problems/report/pictures/template_summary.h"
 #include "surfaces/base/error.h"
+#include "surfaces/mesh/join_copies.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance::problems {
@@ -57,8 +59,8 @@ void Write(const TemplateFace& face, StagedFolder& folder) {
   const auto name = [&](const fs::path& file) {
     return (folder.Root() / file.filename()).string();
   };
-  fmt::print("template: {{type: file, surface: {}, sites: {}, features: {}}}\n",
-             name(files.surface), name(files.sites), name(files.features));
+  Tell("template: {{type: file, surface: {}, sites: {}, features: {}}}\n", name(files.surface),
+       name(files.sites), name(files.features));
 }
 
 // Writes the template of a configuration.
@@ -81,9 +83,11 @@ int MakeFromHead(const TemplateArguments& a) {
   GivenFiles given{.files = a.landmarks, .outputs = kOutputs};
   given.files.push_back(a.input);
   const RunContext context = MakeRunContext(a);
-  const TriMesh mesh = ReadMesh(a.input);
-  const OuterHead head =
-      PrepareHead(mesh, ReadSkinLandmarks(a.landmarks), a.input.string(), context);
+  std::vector<std::string> notes;
+  TriMesh mesh = ReadMeshInLps(a.input, notes);
+  std::ranges::move(JoinCopies(mesh, a.input.string()), std::back_inserter(notes));
+  OuterHead head = PrepareHead(mesh, ReadSkinLandmarks(a.landmarks), a.input.string(), context);
+  head.notes.insert(head.notes.begin(), notes.begin(), notes.end());
   std::optional<WholeHeadFit> whole;
   if (a.bust) {
     whole = FitWholeHead(mesh, a.input.string(), context);
@@ -93,13 +97,13 @@ int MakeFromHead(const TemplateArguments& a) {
   folder.Files().Write("template.json", TemplateJson(fit, head, a.fit));
   folder.Files().Write("template.png", EncodePng(TemplatePicture(fit, head, a.threads)));
   for (const std::string& note : head.notes) {
-    fmt::print("note: {}\n", note);
+    Tell("note: {}\n", note);
   }
-  fmt::print("{}", TemplateText(fit, a.fit));
+  Tell("{}", TemplateText(fit, a.fit));
   if (whole) {
     folder.Files().Write("bust.json", WholeHeadToJson(whole->head));
-    fmt::print("bust.json: {} eyes; {:.3f} mm RMS, at most {:.2f} mm, from the mesh\n",
-               whole->head.eyeballs.size(), whole->rms_mm, whole->max_mm);
+    Tell("bust.json: {} eyes; {:.3f} mm RMS, at most {:.2f} mm, from the mesh\n",
+         whole->head.eyeballs.size(), whole->rms_mm, whole->max_mm);
   }
   Write(fit.face, folder);
   const bool bust_usable = !whole || whole->usable;
@@ -196,7 +200,7 @@ int RecentreCommand(const RecentreArguments& a) {
   StagedFolder folder(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse,
                       ListInputs(a));
   const Recentred result = Recentre(prior, on_template, face, heads, a.options, context);
-  fmt::print(
+  Tell(
       "{} heads: sites moved by {:.1f} mm in the median, the mean by {:.2f} mm RMS, at most "
       "{:.2f} mm\n",
       heads.size(), result.sites_moved_mm, result.mean_moved_mm, result.mean_moved_most_mm);

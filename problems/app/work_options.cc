@@ -8,6 +8,7 @@
 
 #include "problems/app/exit_code.h"
 #include "problems/app/progress.h"
+#include "problems/config/terminal_text.h"
 
 namespace semblance::problems {
 
@@ -64,7 +65,7 @@ StagedFolder MakeStagedFolder(const WorkOptions& options, const std::string& def
 
 int PrintFaults(const std::vector<std::string>& faults) {
   for (const std::string& fault : faults) {
-    fmt::print(stderr, "semblance: the result is not usable: {}\n", fault);
+    Tell(stderr, "semblance: the result is not usable: {}\n", fault);
   }
   return faults.empty() ? kDone : kNotUsable;
 }

@@ -20,6 +20,7 @@
 #include "problems/app/program_end.h"
 #include "problems/app/work_options.h"
 #include "problems/app/workbench/http_server.h"
+#include "problems/config/terminal_text.h"
 #include "problems/io/output_folder.h"
 #include "surfaces/base/error.h"
 
@@ -82,7 +83,7 @@ int Workbench(const WorkbenchArguments& a) {
   HttpServerOptions listening;
   listening.port = a.port;
   HttpServer server(bench, listening);
-  fmt::print(
+  Tell(
       "folder: {}\nopen in a browser on this machine: {}\nCtrl-C ends the program; nothing is "
       "lost\n",
       bench.Folder().string(), server.Url());
@@ -97,7 +98,7 @@ int Workbench(const WorkbenchArguments& a) {
     }
     RemoveStopTimeout();  // closing open connections may take some seconds
   }
-  fmt::print("ended; `semblance workbench {}` continues the work\n", bench.Folder().string());
+  Tell("ended; `semblance workbench {}` continues the work\n", bench.Folder().string());
   return kDone;
 }
 

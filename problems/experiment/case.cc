@@ -13,6 +13,7 @@
 #include "problems/subject/network_plan.h"
 #include "problems/subject/phantom.h"
 #include "problems/subject/sites.h"
+#include "surfaces/mesh/join_copies.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -30,10 +31,8 @@ TriMesh ReadHeadMesh(const FileSubject& options, const std::filesystem::path& pa
     throw InputError(fmt::format(
         "subject.{}: no file is named; give the path of a mesh (PLY, OBJ, STL or OFF)", option));
   }
-  TriMesh mesh = ReadMesh(path);
-  for (Vec3& p : mesh.points) {
-    p = ToLpsMm(p, options.axes, options.units);
-  }
+  TriMesh mesh = ReadSubjectMesh(options, path, subject.notes);
+  Append(subject.notes, JoinCopies(mesh, path.filename().string()));
   Append(subject.notes, CheckHeadMesh(mesh, path.filename().string()));
   subject.inputs.push_back(path);
   return mesh;
@@ -131,9 +130,19 @@ std::vector<Dowel> DowelsAsGiven(const Case& subject, std::vector<Dowel> dowels)
   return dowels;
 }
 
+// Compares skull, landmarks and skin with each other.
 std::vector<std::string> CheckLandmarks(const SubjectData& data, const MeshQuery& skull,
                                         const PlaceOptions& options) {
-  const LandmarkMistakes found = FindLandmarkMistakes(data.landmarks, data.skull, skull, options);
+  InputMistakes found = FindLandmarkMistakes(data.landmarks, data.skull, skull, options);
+  if (data.skin) {
+    InputMistakes of_skin = FindSkinMistakes({.skin = *data.skin,
+                                              .skull = &skull,
+                                              .extent = Bounds(data.skull),
+                                              .landmarks = data.landmarks,
+                                              .landmarks_fit = found.errors.empty()});
+    Append(found.errors, of_skin.errors);
+    Append(found.notes, of_skin.notes);
+  }
   if (!found.errors.empty()) {
     throw InputError(fmt::format("{}", fmt::join(found.errors, "\n")));
   }
@@ -229,6 +238,12 @@ void GiveDepths(const SubjectData& data, const Experiment& experiment, const Mes
     Append(subject.notes, used.notes);
   }
   Append(subject.notes, FillDepths(tissue, data.landmarks, all, subject.dowels_on_bone));
+  const TriMesh* const skin = data.skin ? &*data.skin : nullptr;
+  Append(subject.notes, TurnToSkin({.landmarks = data.landmarks,
+                                    .skin = skin,
+                                    .skull = query,
+                                    .noise_mm = experiment.landmarks.noise_mm},
+                                   all, subject.dowels_on_bone));
   subject.basis = MakeScoreBasis(DowelsAsGiven(subject, all));
   subject.scored_on_bone = std::move(all);
   Append(subject.notes, ConditionDepths(tissue, data.landmarks, subject.dowels_on_bone));
@@ -298,6 +313,27 @@ void CheckNetworkNamed(const Experiment& experiment, const std::filesystem::path
         "standard one)",
         config.empty() ? "" : config.string() + ": "));
   }
+}
+
+TriMesh ReadSubjectMesh(const FileSubject& subject, const std::filesystem::path& path,
+                        std::vector<std::string>& notes) {
+  MeshFile file = ReadMeshFile(path);
+  const bool states_ras = file.axes == MeshAxes::kRas;
+  const Axes axes = subject.axes.value_or(states_ras ? Axes::kRas : Axes::kLps);
+  if (file.axes != MeshAxes::kUnstated && states_ras != (axes == Axes::kRas)) {
+    throw InputError(fmt::format(
+        "{}: the file states SPACE={}, and subject.axes is {}; leave subject.axes out, or correct "
+        "the one that is wrong",
+        path.string(), states_ras ? "RAS" : "LPS", states_ras ? "LPS" : "RAS"));
+  }
+  if (states_ras && !subject.axes) {
+    notes.push_back(fmt::format("{}: the file states SPACE=RAS; turned to LPS (x and y negated)",
+                                path.filename().string()));
+  }
+  for (Vec3& p : file.mesh.points) {
+    p = ToLpsMm(p, axes, subject.units);
+  }
+  return std::move(file.mesh);
 }
 
 SubjectData LoadSubject(const Subject& subject, const RunContext& context,

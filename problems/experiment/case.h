@@ -45,12 +45,19 @@ struct Case {
 // kOpen: a subject may come without a file of landmarks, and then has none.
 enum class Landmarking { kNeeded, kOpen };
 
+// Reads one mesh of a subject and turns it to mm and LPS: from `subject.axes` if it is set,
+// otherwise from the axes that the file states (mesh_io.h), with a note if they are RAS. Throws as
+// ReadMeshFile, and InputError if the two axes contradict each other.
+TriMesh ReadSubjectMesh(const FileSubject& subject, const std::filesystem::path& path,
+                        std::vector<std::string>& notes);
+
 // Reads or makes the subject and checks its meshes. Throws InputError, IoError or ConfigError with
 // one clear line for what cannot be used.
 SubjectData LoadSubject(const Subject& subject, const RunContext& context,
                         Landmarking landmarking = Landmarking::kNeeded);
 
-// Checks that skull and landmarks belong together and are those of a head (landmark_mistakes.h).
+// Checks that skull, landmarks and skin belong together and are those of a head
+// (landmark_mistakes.h, input_mistakes.h).
 // Returns notes on what may be intended, one line each. Throws InputError with one line per
 // mistake.
 std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOptions& options);

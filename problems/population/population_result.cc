@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "problems/config/config.h"
+#include "problems/config/terminal_text.h"
 #include "problems/io/manifest.h"
 #include "problems/population/depth_modes.h"
 #include "problems/population/population_report.h"
@@ -354,7 +355,7 @@ void WritePopulation(const PopulationResult& result, OutputFolder& folder) {
       {"leave_one_out.csv", LeaveOneOutCsv(result)},
       {"dense.csv", DenseCsv(result.dense)},
       {"dense.ply", EncodeMesh(mesh.mesh, ".ply", attributes)},
-      {"population.json", SummaryJson(result).dump(2) + "\n"},
+      {"population.json", WithPlainTexts(SummaryJson(result)).dump(2) + "\n"},
       {"report.html", PopulationReport(result)}};
   for (const auto& [name, bytes] : files) {
     folder.Write(name, bytes);

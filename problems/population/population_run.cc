@@ -11,6 +11,7 @@
 #include <optional>
 #include <system_error>
 
+#include "problems/config/terminal_text.h"
 #include "problems/io/output_folder.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -61,8 +62,8 @@ std::optional<Json> ReadSubject(const fs::path& folder, const std::string& id,
 }
 
 void WriteSubject(const fs::path& folder, const Json& json, Durability durability) {
-  WriteFileAtomically(ResultFile(folder, json.at("id").get<std::string>()), json.dump() + "\n",
-                      durability);
+  WriteFileAtomically(ResultFile(folder, json.at("id").get<std::string>()),
+                      WithPlainTexts(json).dump() + "\n", durability);
 }
 
 std::vector<fs::path> ListEntries(const fs::path& folder) {

@@ -13,6 +13,7 @@
 #include <set>
 #include <utility>
 
+#include "problems/config/terminal_text.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/report/pictures/pictures.h"
 #include "problems/report/run_folder.h"
@@ -317,7 +318,7 @@ std::vector<std::string> RunAlternatives(const Experiment& experiment,
   for (const Answer& answer : answers) {
     json.push_back(answer.json);
   }
-  folder.Write("alternatives.json", json.dump(2) + "\n");
+  folder.Write("alternatives.json", WithPlainTexts(json).dump(2) + "\n");
   ComparedPictures pictures(answers, folder, context.threads);
   for (const View view : {View::kFront, View::kThreeQuarter, View::kSide}) {
     pictures.WriteHeads(view);

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "problems/config/terminal_text.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/report/pictures/pictures.h"
 #include "problems/report/result_json.h"
@@ -283,7 +284,7 @@ std::string DepthPicture(const DepthResult& result, int threads) {
 void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputFolder& folder,
                 const RunContext& context) {
   folder.Write("resolved.yaml", WriteConfig(experiment));
-  folder.Write("result.json", DepthResultJson(experiment, result).dump(2) + "\n");
+  folder.Write("result.json", WithPlainTexts(DepthResultJson(experiment, result)).dump(2) + "\n");
   folder.Write("left_out.csv", LeftOutCsv(result));
   folder.Write("depth.ply", DepthPly(result));
   folder.Write("tips.ply", TipsPly(result));

@@ -167,12 +167,10 @@ NameWords SplitName(std::string_view name) {
 
 std::vector<std::string> SplitWords(std::string_view name) { return SplitName(name).words; }
 
-bool IsOnSkin(const NameWords& name) {
+bool IsSkinWord(const std::string& word) {
   constexpr std::array<std::string_view, 6> kSkinWords = {"soft",      "tissue", "skin",
                                                           "cutaneous", "dermal", "epidermal"};
-  return name.has_prime || std::ranges::any_of(name.words, [&](const std::string& word) {
-           return std::ranges::find(kSkinWords, word) != kSkinWords.end();
-         });
+  return std::ranges::find(kSkinWords, word) != kSkinWords.end();
 }
 
 std::optional<Side> ParseSide(std::string_view word) {
@@ -330,10 +328,11 @@ std::string SiteFault(std::string_view site) {
   return UnknownSite(site, codes);
 }
 
-NamedSite FindSiteByName(std::string_view name) {
+NamedSite FindSiteByName(std::string_view name, PointsLieOn place) {
   NameWords split = SplitName(name);
   std::vector<std::string>& words = split.words;
-  if (IsOnSkin(split)) {
+  const bool is_on_skin = std::erase_if(words, IsSkinWord) > 0 || split.has_prime;
+  if (is_on_skin && place == PointsLieOn::kBone) {
     return {.code = "",
             .fault = fmt::format("'{}' names a point on the skin, and landmarks are points on the "
                                  "bone; place the bone's point, or leave this one out",

@@ -68,8 +68,9 @@ struct NamedSite {
 // landmark ("left gonion", "Gonion (L)", "go_L", "18r"), or directly after a code ("goL", as Caple
 // and Stephan 2016 write). A landmark in the midline takes no side; a landmark of a pair needs one.
 // A name with a prime ("n'") or with a word such as "soft" or "skin" means a point on the skin, and
-// so no site.
-NamedSite FindSiteByName(std::string_view name);
+// so no site on the bone; for points that lie on the skin, primes and these words are dropped.
+enum class PointsLieOn { kBone, kSkin };
+NamedSite FindSiteByName(std::string_view name, PointsLieOn place = PointsLieOn::kBone);
 
 // Further names of a landmark ("go"), besides its code, number and printed name.
 std::vector<std::string> OtherSiteNames(std::string_view landmark);

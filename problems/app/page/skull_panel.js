@@ -26,7 +26,7 @@ function asRead({subject, values}) {
       unit ? element('div', {className: 'row hint'}, `In ${unit[1]}s it would have the size of a head.`,
                      button(`Use ${unit[1]}s`, () => act('set', {path: 'subject.units', value: unit[0]}), {className: 'primary'})) : null,
       element('p', {className: 'soft', textContent: 'A head is about 150 mm wide, 190 mm deep and 200 mm high. In the view Front it should face you, upright; the compass names its sides.'}),
-      field('axes of the file', select([['LPS', 'LPS: +x left, +y back'], ['RAS', 'RAS: +x right, +y front']], axes,
+      field('axes of the file', select([['LPS', 'LPS: +x left, +y back'], ['RAS', 'RAS: +x right, +y front']], axes || 'LPS',
             (value) => act('set', {path: 'subject.axes', value}))),
       field('unit of the file', select(UNITS, units, (value) => act('set', {path: 'subject.units', value}))),
       subject.skin ? element('div', {className: 'row'}, element('span', {className: 'soft', title: subject.skin, textContent: `Skin: ${nameOf(subject.skin)}`}),

@@ -174,7 +174,8 @@ BenchState DropSetting(BenchState state, const std::string& path) {
 BenchState ChangeFrame(BenchState state, const std::vector<std::string>& sites,
                        const FileSubject& before, const FileSubject& after) {
   const auto turn = [&](const std::array<double, 3>& v) {
-    const Vec3 now = ToLps(ToLps({v[0], v[1], v[2]}, before.axes), after.axes);
+    const Vec3 now = ToLps(ToLps({v[0], v[1], v[2]}, before.axes.value_or(Axes::kLps)),
+                           after.axes.value_or(Axes::kLps));
     return std::array{now.x(), now.y(), now.z()};
   };
   const double scale = Millimetres(after.units) / Millimetres(before.units);

@@ -90,7 +90,7 @@ LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, co
     MeasureMirrors(sites, *plane, checks);
   }
   if (!file.landmarks.empty()) {
-    LandmarkMistakes found = FindLandmarkMistakes(file, skull, bone, options);
+    InputMistakes found = FindLandmarkMistakes(file, skull, bone, options);
     checks.errors = std::move(found.errors);
     checks.notes = std::move(found.notes);
   }

@@ -302,7 +302,7 @@ BenchState WithHead(BenchState state, const FileSubject& files, const std::strin
 // Converts a mesh in mm and LPS to the axes and the unit of the subject's files.
 TriMesh ToSubjectFrame(const FileSubject& files, TriMesh mesh) {
   for (Vec3& p : mesh.points) {
-    p = ToLps(p, files.axes) / Millimetres(files.units);
+    p = ToLps(p, files.axes.value_or(Axes::kLps)) / Millimetres(files.units);
   }
   return mesh;
 }
@@ -337,9 +337,10 @@ Opened OpenMesh(const OpenRequest& request, const fs::path& path, const OpenBase
   if (request.as == OpenAs::kHead) {
     FileSubject files;
     files.skull = file;
-    return {.what = {},
-            .state = WithHead(base.state, files, PlainName(path), base.folder.Root()),
-            .notes = {}};
+    return {
+        .what = {},
+        .state = WithHead(base.state, WithStatedAxes(files), PlainName(path), base.folder.Root()),
+        .notes = {}};
   }
   return {.what = {},
           .state = ChangeSetting(base.state, fmt::format("subject.{}", EnumWord(request.as)),

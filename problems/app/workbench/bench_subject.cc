@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <initializer_list>
+#include <set>
 
 #include "problems/app/workbench/bench_actions.h"
+#include "problems/experiment/case.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/io/output_folder.h"
 #include "problems/io/volumes/read_volume.h"
@@ -16,6 +18,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
+#include "surfaces/mesh/join_copies.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -28,14 +31,6 @@ namespace fs = std::filesystem;
 // bone, more make the page slow. Landmarks are placed on the full mesh in any case.
 constexpr int kSkullTriangles = 60000;
 
-TriMesh ReadInMm(const fs::path& path, const FileSubject& files) {
-  TriMesh mesh = ReadMesh(path);
-  for (Vec3& p : mesh.points) {
-    p = ToLpsMm(p, files.axes, files.units);
-  }
-  return mesh;
-}
-
 void AppendMesh(const TriMesh& more, TriMesh& mesh) {
   const auto first = static_cast<std::int32_t>(mesh.points.size());
   mesh.points.insert(mesh.points.end(), more.points.begin(), more.points.end());
@@ -45,7 +40,8 @@ void AppendMesh(const TriMesh& more, TriMesh& mesh) {
 }
 
 // Adds faults of the mesh to the subject instead of throwing, so that the page can show the mesh.
-void CheckMesh(const TriMesh& mesh, const fs::path& path, BenchSubject& subject) {
+void CheckMesh(TriMesh& mesh, const fs::path& path, BenchSubject& subject) {
+  std::ranges::move(JoinCopies(mesh, path.filename().string()), std::back_inserter(subject.notes));
   try {
     std::ranges::move(CheckHeadMesh(mesh, path.filename().string()),
                       std::back_inserter(subject.notes));
@@ -73,7 +69,7 @@ FileSubject WriteMeshes(const TriMesh& skull, const TriMesh& skin, const fs::pat
 FileSubject ToFiles(const FileSubject& subject, const fs::path&, BenchState& state,
                     const RunContext&, std::vector<std::string>&) {
   AddLandmarks(subject.landmarks, state);
-  FileSubject files = subject;
+  FileSubject files = WithStatedAxes(subject);
   files.landmarks.clear();
   return files;
 }
@@ -125,7 +121,7 @@ Subject SubjectFromSource(const fs::path& source) {
   }
   if (IsAnyOf(LowerExtension(source), {".ply", ".obj", ".stl", ".off"})) {
     files.skull = fs::absolute(source);
-    return files;
+    return WithStatedAxes(files);
   }
   CtSubject ct;
   ct.volume = fs::absolute(source);
@@ -134,15 +130,28 @@ Subject SubjectFromSource(const fs::path& source) {
 
 }  // namespace
 
+FileSubject WithStatedAxes(FileSubject files) {
+  std::set<Axes> stated;
+  for (const fs::path& mesh : {files.skull, files.skin, files.mandible.mesh}) {
+    if (!mesh.empty()) {
+      stated.insert(ReadStatedAxes(mesh) == MeshAxes::kRas ? Axes::kRas : Axes::kLps);
+    }
+  }
+  if (!files.axes && stated.size() == 1) {
+    files.axes = *stated.begin();
+  }
+  return files;
+}
+
 BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context) {
   BenchSubject subject;
   if (files.skull.empty()) {
     return subject;
   }
   context.Report("read skull");
-  subject.skull.mesh = ReadInMm(files.skull, files);
+  subject.skull.mesh = ReadSubjectMesh(files, files.skull, subject.notes);
   if (!files.mandible.mesh.empty()) {
-    AppendMesh(ReadInMm(files.mandible.mesh, files), subject.skull.mesh);
+    AppendMesh(ReadSubjectMesh(files, files.mandible.mesh, subject.notes), subject.skull.mesh);
   }
   CheckMesh(subject.skull.mesh, files.skull, subject);
   subject.skull.view = SimplifyForView(subject.skull.mesh, kSkullTriangles);
@@ -150,7 +159,7 @@ BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& contex
   subject.view_bone = std::make_shared<const MeshQuery>(subject.skull.view);
   if (!files.skin.empty()) {
     context.Report("read skin");
-    BenchMesh skin{.mesh = ReadInMm(files.skin, files), .view = {}};
+    BenchMesh skin{.mesh = ReadSubjectMesh(files, files.skin, subject.notes), .view = {}};
     CheckMesh(skin.mesh, files.skin, subject);
     skin.view = SimplifyForView(skin.mesh);
     subject.skin = std::move(skin);

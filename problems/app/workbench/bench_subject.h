@@ -29,6 +29,11 @@ struct BenchSubject {
   std::vector<std::string> notes;
 };
 
+// The subject with the axes that its meshes state, or LPS, in words, so that people see and correct
+// them; unchanged if it has axes already or the meshes differ. Throws IoError if a mesh cannot be
+// read.
+FileSubject WithStatedAxes(FileSubject files);
+
 // Throws IoError or InputError if a file cannot be read at all.
 BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context);
 

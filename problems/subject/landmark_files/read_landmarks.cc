@@ -14,7 +14,6 @@
 #include "problems/subject/landmark_files/landmark_table.h"
 #include "problems/subject/landmark_files/markups_json.h"
 #include "problems/subject/landmark_files/point_files.h"
-#include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
@@ -91,7 +90,7 @@ void NameSites(const ReadLandmarksOptions& options, std::vector<Entry>& entries,
                std::vector<std::string>& faults) {
   std::vector<Entry> known;
   for (Entry& entry : entries) {
-    const NamedSite site = FindSiteByName(entry.site);
+    const NamedSite site = FindSiteByName(entry.site, options.place);
     if (!site.code.empty()) {
       if (!site.note.empty()) {
         notes.push_back(site.note);

@@ -8,12 +8,14 @@
 #include <vector>
 
 #include "problems/subject/landmarks.h"
+#include "problems/subject/sites.h"
 
 namespace semblance::problems {
 
 struct ReadLandmarksOptions {
   std::optional<Axes> axes;  // axes of a file that does not state them; none: LPS, with a note
   bool leave_out_unknown = false;  // skips points whose name is not a site, with a note each
+  PointsLieOn place = PointsLieOn::kBone;  // kSkin: "n'" names a point, rather than a fault
 };
 
 // Landmarks in LPS and mm, and notes for people on how they were read.

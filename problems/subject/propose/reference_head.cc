@@ -17,6 +17,7 @@
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/mesh/join_copies.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/tri_mesh.h"
@@ -102,8 +103,7 @@ void CheckReference(const fs::path& path, const LandmarkFile& file, const TriMes
     throw InputError(fmt::format("{}: a reference needs at least {} landmarks, and has {}",
                                  path.string(), kMinLandmarks, file.landmarks.size()));
   }
-  const LandmarkMistakes found =
-      FindLandmarkMistakes(file, skull, MeshQuery(skull), PlaceOptions{});
+  const InputMistakes found = FindLandmarkMistakes(file, skull, MeshQuery(skull), PlaceOptions{});
   if (!found.errors.empty()) {
     throw InputError(fmt::format("reference {}: {}", path.string(), fmt::join(found.errors, "\n")));
   }
@@ -162,7 +162,9 @@ ReferenceHead MakeReference(const std::string& name, const TriMesh& skull,
 }
 
 ReferenceHead ReadReference(const fs::path& skull, const fs::path& landmarks, int threads) {
-  const TriMesh mesh = ReadMesh(skull);
+  std::vector<std::string> ignored;  // a turn from RAS, which does not change the reference
+  TriMesh mesh = ReadMeshInLps(skull, ignored);
+  JoinCopies(mesh, skull.string());
   CheckHeadMesh(mesh, skull.string());
   const LandmarkFile file = ReadLandmarks(landmarks).file;
   CheckReference(landmarks, file, mesh);

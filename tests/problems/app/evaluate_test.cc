@@ -66,6 +66,7 @@ class EvaluateFace : public ::testing::Test {
   }
 
   ScratchFolder folder_;
+  std::vector<std::string> notes_;
 };
 
 TEST_F(EvaluateFace, GivesTheNumbersOfTheRun) {
@@ -73,7 +74,7 @@ TEST_F(EvaluateFace, GivesTheNumbersOfTheRun) {
   const RunResult run = problems::Run(experiment, {});
   WriteHSpline(folder_ / "face.hspline.json", run.fit.surface);
   const auto expected = ResultJson(experiment, run).at("face");
-  const auto by_config = nlohmann::ordered_json::parse(Evaluate(OptionsOfRun(), {}).dump());
+  const auto by_config = nlohmann::ordered_json::parse(Evaluate(OptionsOfRun(), {}, notes_).dump());
   EXPECT_EQ(by_config, expected);
   EXPECT_GT(expected.at("scored_skin").at("masked_cm2"), 5);
 
@@ -82,20 +83,52 @@ TEST_F(EvaluateFace, GivesTheNumbersOfTheRun) {
   by_files.truth = folder_ / "skin.ply";
   by_files.landmarks = folder_ / "marks.yaml";
   by_files.exclude = {ParseZone("zy_r=25")};
-  EXPECT_EQ(nlohmann::ordered_json::parse(Evaluate(by_files, {}).dump()), expected);
+  EXPECT_EQ(nlohmann::ordered_json::parse(Evaluate(by_files, {}, notes_).dump()), expected);
+}
+
+// 3D Slicer states the axes of a model in its file.
+TEST_F(EvaluateFace, TurnsAFaceInRasAndSaysSo) {
+  EvaluateOptions options = OptionsOfRun();
+  options.config.clear();
+  options.truth = folder_ / "skin.ply";
+  TriMesh face = ReadMesh(folder_ / "skin.ply");
+  for (Vec3& p : face.points) {
+    p = Vec3(-p.x(), -p.y(), p.z());
+  }
+  std::string bytes = EncodeMesh(face, ".ply");
+  WriteBytes("face.ply", bytes.insert(bytes.find("element"), "comment SPACE=RAS\n"));
+  options.face = folder_ / "face.ply";
+  EXPECT_LT(Evaluate(options, {}, notes_).at("rms_mm").get<double>(), 1e-4);
+  EXPECT_EQ(notes_,
+            std::vector<std::string>{"face.ply: the file states SPACE=RAS; turned to LPS (x "
+                                     "and y negated)"});
+}
+
+TEST_F(EvaluateFace, AFieldModelInRasIsThatInLps) {
+  const std::filesystem::path field = SEMBLANCE_SOURCE_DIR "/../shared/data/field";
+  if (!std::filesystem::exists(field)) {
+    GTEST_SKIP() << "the inputs of the field are not here";
+  }
+  EvaluateOptions options;
+  options.face = field / "ball-ras.ply";
+  options.truth = field / "ball-lps.ply";
+  EXPECT_LT(Evaluate(options, {}, notes_).at("rms_mm").get<double>(), 1e-4);
+  EXPECT_EQ(notes_.size(), 1U);
 }
 
 TEST_F(EvaluateFace, RefusesOptionsThatCannotBeCombined) {
   EvaluateOptions options = OptionsOfRun();
   options.face = folder_ / "skin.ply";
   options.landmarks = folder_ / "marks.yaml";
-  EXPECT_THAT(WordsOf<InputError>([&] { Evaluate(options, {}); }), HasSubstr("--landmarks"));
+  EXPECT_THAT(WordsOf<InputError>([&] { Evaluate(options, {}, notes_); }),
+              HasSubstr("--landmarks"));
   options.config.clear();
-  EXPECT_THAT(WordsOf<InputError>([&] { Evaluate(options, {}); }), HasSubstr("nothing to compare"));
+  EXPECT_THAT(WordsOf<InputError>([&] { Evaluate(options, {}, notes_); }),
+              HasSubstr("nothing to compare"));
   options.truth = folder_ / "skin.ply";
   options.landmarks.clear();
   options.exclude = {{"g", 10}};
-  EXPECT_THAT(WordsOf<InputError>([&] { Evaluate(options, {}); }), HasSubstr("--exclude"));
+  EXPECT_THAT(WordsOf<InputError>([&] { Evaluate(options, {}, notes_); }), HasSubstr("--exclude"));
 }
 
 TEST(ParseZone, ReadsASiteAndARadius) {

@@ -139,6 +139,9 @@ TEST(FindSiteByName, APointOnTheSkinIsNoSite) {
     EXPECT_EQ(FindSiteByName(name).code, "") << name;
     EXPECT_THAT(FindSiteByName(name).fault, HasSubstr("names a point on the skin")) << name;
   }
+  EXPECT_EQ(FindSiteByName("goR'", PointsLieOn::kSkin).code, "go_r");
+  EXPECT_EQ(FindSiteByName("soft tissue nasion", PointsLieOn::kSkin).code, "n");
+  EXPECT_EQ(FindSiteByName("skin", PointsLieOn::kSkin).code, "");
   for (const char* name : {"'n'", "\"n\"", "'n"}) {
     EXPECT_EQ(FindSiteByName(name).code, "n") << name << " is quoted";
   }

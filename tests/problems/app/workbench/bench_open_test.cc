@@ -18,6 +18,7 @@
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
+#include "tests/testing/scratch_file.h"
 #include "tests/testing/scratch_folder.h"
 
 namespace semblance::problems {
@@ -28,6 +29,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::ScratchFolder;
 using ::testing::SizeIs;
+using testing::WordsOf;
 
 constexpr const char* kLandmarks =
     "subject: other\nlandmarks:\n  - {site: g, point: [0, -90, 10]}\n"
@@ -162,6 +164,23 @@ TEST_F(WorkbenchOpening, AnotherHeadKeepsTheOptionsButNoLandmarksOrEdits) {
   EXPECT_EQ(StateIn(shot).subject, "skull");
   bench.Undo();
   EXPECT_THAT(StateIn(bench.TakeSnapshot()).landmarks, SizeIs(32));
+  EXPECT_EQ(std::get<FileSubject>(bench.TakeSnapshot().experiment.subject).axes, Axes::kRas);
+}
+
+// 3D Slicer states the axes of a model; the workbench shows them as the subject's axes.
+TEST_F(WorkbenchOpening, AHeadThatStatesItsAxesIsShownInLps) {
+  TriMesh ras = phantom_.skull;
+  for (Vec3& p : ras.points) {
+    p = Vec3(-p.x(), -p.y(), p.z());
+  }
+  const fs::path file = Write("ras.obj", "# SPACE=RAS\n" + EncodeMesh(ras, ".obj"));
+  Bench bench(Options());
+  ASSERT_EQ(Open(bench, file, OpenAs::kHead).state, JobState::kFinished);
+  const Bench::Snapshot shot = bench.TakeSnapshot();
+  EXPECT_EQ(std::get<FileSubject>(shot.experiment.subject).axes, Axes::kRas);
+  EXPECT_LT((shot.subject->skull.mesh.points[0] - phantom_.skull.points[0]).norm(), 1e-4);
+  EXPECT_THAT(WordsOf<InputError>([&] { bench.CorrectFrame("subject.axes", "\"LPS\""); }),
+              HasSubstr("the file states SPACE=RAS, and subject.axes is LPS"));
   EXPECT_EQ(std::get<FileSubject>(bench.TakeSnapshot().experiment.subject).axes, Axes::kRas);
 }
 
