@@ -43,7 +43,7 @@ struct FileSubject {
   std::filesystem::path skull;
   std::filesystem::path skin;
   std::filesystem::path landmarks;
-  Axes axes = Axes::kLps;
+  std::optional<Axes> axes;  // none: those that each file states, otherwise LPS
   LengthUnit units = LengthUnit::kMillimetre;
   MandibleOptions mandible;
   MirrorOptions mirror;
@@ -61,7 +61,8 @@ void Fields(Visitor& visit, FileSubject& o) {
   visit(
       FieldInfo{.name = "axes",
                 .doc = "axes of skull and skin (the landmarks' file has its own); LPS: +x subject "
-                       "left, +y posterior, +z up; RAS: x and y the other way. All results are "
+                       "left, +y posterior, +z up; RAS: x and y the other way; null: those that "
+                       "the file states as SPACE=RAS or SPACE=LPS, otherwise LPS. All results are "
                        "LPS"},
       o.axes);
   visit(FieldInfo{.name = "units",
