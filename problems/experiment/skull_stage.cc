@@ -13,6 +13,8 @@
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/extra_dowels.h"
 #include "problems/io/manifest.h"
+#include "problems/subject/average_skull.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/encoding.h"
 
 namespace semblance::problems {
@@ -83,12 +85,6 @@ class Reader {
   std::string_view rest_;
   bool whole_ = true;
 };
-
-// Part of the key, because another build may compute other bits.
-const std::string& ProgramHash() {
-  static const std::string hash = Sha256OfFile("/proc/self/exe");
-  return hash;
-}
 
 std::string MakeKey(const TriMesh& shell, std::span<const double> depth_mm,
                     const ImplicitFaceOptions& options) {
@@ -166,6 +162,37 @@ void NoteEnds(const DepthField& depth, std::vector<std::string>& notes) {
   }
 }
 
+// The rotation from the subject's frame to that of the average skull, or none without three sites.
+// Alpha wrapping and marching cubes work along their axes. They do so in this frame, so that the
+// face turns with the skull.
+Mat3 FindUpright(const SubjectData& data) {
+  constexpr std::size_t kFewestSites = 3;
+  std::vector<SitePoint> sites;
+  for (const Landmark& landmark : data.landmarks.landmarks) {
+    if (IsStandardSite(landmark.site)) {
+      sites.push_back({landmark.site, landmark.Position()});
+    }
+  }
+  return sites.size() < kFewestSites
+             ? Mat3(Mat3::Identity())
+             : Mat3(FitAverageSkull(sites).skull_from_average.rotation.transpose());
+}
+
+TriMesh Rotated(TriMesh mesh, const Mat3& rotation) {
+  for (Vec3& p : mesh.points) {
+    p = rotation * p;
+  }
+  return mesh;
+}
+
+TriMesh FillUpright(const SubjectData& data, const SkullFill& fill, const RunContext& context) {
+  if (std::holds_alternative<NoFill>(fill)) {
+    return data.skull;
+  }
+  const Mat3 upright = FindUpright(data);
+  return Rotated(FillSkull(Rotated(data.skull, upright), fill, context), upright.transpose());
+}
+
 DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& step,
                            const RunContext& context) {
   constexpr double kLeastDepth_mm = 1;  // of a dowel on the shell
@@ -176,7 +203,7 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
   Case subject = MakeCase(*data, e);
   const auto shell = step("fill skull", [&] {
     return cache.Get<TriMesh>(StageKey("shell", e.subject, e.fill),
-                              [&] { return FillSkull(data->skull, e.fill, context); });
+                              [&] { return FillUpright(*data, e.fill, context); });
   });
   const auto* const wrap = std::get_if<WrapFill>(&e.fill);
   TriMesh pressed =
@@ -187,6 +214,7 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
   ProjectedDowels expected = ProjectOntoShell(subject.expected_on_bone, pressed, kLeastDepth_mm);
   ProjectedDowels scored = ProjectOntoShell(subject.scored_on_bone, pressed, kLeastDepth_mm);
   DepthStage stage{std::move(subject),
+                   FindUpright(*data),
                    std::move(pressed),
                    std::move(normals),
                    std::move(projected.dowels_on_shell),
@@ -234,6 +262,16 @@ std::vector<double> DepthsToTheEnds(const DepthStage& stage, std::span<const Cut
   return depth_mm;
 }
 
+ImplicitFace UprightImplicitFace(const DepthStage& stage, std::span<const double> depth_mm,
+                                 const ImplicitFaceOptions& options, const DiskCache* cache,
+                                 const RunContext& context) {
+  ImplicitFace face =
+      CachedImplicitFace(Rotated(stage.shell, stage.upright), depth_mm, options, cache, context);
+  face.dense = Rotated(std::move(face.dense), stage.upright.transpose());
+  face.mesh = Rotated(std::move(face.mesh), stage.upright.transpose());
+  return face;
+}
+
 }  // namespace
 
 std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache& cache,
@@ -245,13 +283,14 @@ std::shared_ptr<const SkullStage> MakeSkullStage(const Experiment& e, StageCache
       return OriginOfShell(depth->shell, skull, depth->subject.origin, context.threads);
     });
     std::vector<CutPlane> cuts = FindCutPlanes(skull);
+    const std::vector<double> depth_mm =
+        e.implicit.ends == FaceEnds::kOpen ? DepthsToTheEnds(*depth, cuts) : depth->depth.depth_mm;
     ImplicitFace implicit = step("implicit face", [&] {
-      return CachedImplicitFace(depth->shell,
-                                e.implicit.ends == FaceEnds::kOpen ? DepthsToTheEnds(*depth, cuts)
-                                                                   : depth->depth.depth_mm,
-                                e.implicit, cache.disk(), context);
+      return UprightImplicitFace(*depth, depth_mm, e.implicit, cache.disk(), context);
     });
-    return SkullStage{std::move(depth), std::move(origin), std::move(cuts), std::move(implicit)};
+    auto field = std::make_shared<const ImplicitSurface>(depth->shell, depth_mm, e.implicit.field);
+    return SkullStage{std::move(depth), std::move(origin), std::move(cuts), std::move(implicit),
+                      std::move(field)};
   });
 }
 

@@ -40,6 +40,7 @@ std::optional<ImplicitFace> ImplicitFaceFrom(std::string_view bytes);
 
 struct DepthStage {
   Case subject;
+  Mat3 upright;               // rotates the subject's frame to that of the average skull
   TriMesh shell;              // outer shell of the skull with bridged temples and gaps; it emits
   std::vector<Vec3> normals;  // of the shell's vertices
   std::vector<Dowel> dowels_on_shell;    // subject.dowels_on_bone, projected onto the shell
@@ -62,6 +63,7 @@ struct SkullStage {
   std::vector<BoneOrigin> origin;  // of the shell's triangles
   std::vector<CutPlane> cuts;      // the planes at which the subject's skull is cut off
   ImplicitFace implicit;
+  std::shared_ptr<const ImplicitSurface> field;  // the surface whose polygons `implicit` has
 };
 
 // The depth stage and the implicit face.

@@ -7,12 +7,15 @@
 #include <algorithm>
 #include <chrono>
 #include <iterator>
+#include <nlohmann/json.hpp>
+#include <sstream>
 #include <utility>
 
 #include "problems/app/workbench/bench_actions.h"
 #include "problems/app/workbench/bench_config.h"
 #include "problems/config/config.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/io/staged_folder.h"
 #include "problems/report/run_folder.h"
 #include "problems/subject/propose/propose_landmarks.h"
@@ -30,9 +33,11 @@ using Lock = std::lock_guard<std::mutex>;
 
 constexpr const char* kBeforeEdits = "face_before_edits.hspline.json";
 constexpr const char* kRunKey = "run_key.txt";
+constexpr const char* kRunFaults = "run_faults.json";
 // Number of kept intermediate results of runs: the stages of the present run and those of its
 // variants that differ. Fewer values make variants repeat stages, more cost memory.
 constexpr int kRunStages = 12;
+constexpr int kModels = 6;  // number of kept templates and priors
 
 const FileSubject& SubjectFiles(const Experiment& experiment) {
   const auto* files = std::get_if<FileSubject>(&experiment.subject);
@@ -43,11 +48,66 @@ const FileSubject& SubjectFiles(const Experiment& experiment) {
   return *files;
 }
 
-// Text of all options that the meshes depend on.
-std::string SubjectKey(const FileSubject& subject) {
-  FileSubject meshes = subject;
+// The experiment without the files that follow from the state: those of landmarks and edits.
+Experiment WithoutStateFiles(Experiment experiment, const BenchState& state) {
+  experiment.edits.clear();
+  auto* const files = std::get_if<FileSubject>(&experiment.subject);
+  if (files != nullptr && !state.landmarks.empty()) {
+    files->landmarks.clear();
+  }
+  return experiment;
+}
+
+// The paths and options of the meshes.
+std::string SubjectOptions(const Experiment& experiment) {
+  FileSubject meshes = SubjectFiles(experiment);
   meshes.landmarks.clear();
   return StageKey("bench subject", meshes);
+}
+
+// If the files of a head cannot be read any more, the page shows the fault instead of the meshes,
+// so that a person can repair them or open others.
+BenchSubject LoadOrExplain(const FileSubject& files, const RunContext& context) {
+  try {
+    return LoadBenchSubject(files, context);
+  } catch (const Error& error) {
+    BenchSubject none;
+    none.faults = {error.what()};
+    return none;
+  }
+}
+
+InputHashes HashInputs(const Experiment& experiment, FileHashes& hashes) {
+  InputHashes contents;
+  for (const NamedFile& input : NamedFiles(experiment)) {
+    contents[{input.option, input.file}] = HashContent(input, hashes);
+  }
+  return contents;
+}
+
+// Options as text, with the contents of their files.
+template <class Options>
+std::string ContentText(const Options& options, const std::string& option,
+                        const InputHashes& contents) {
+  return ToFlowYaml(
+      WithInputs(MakeConfigTree(options), NamedFiles(options), [&](const NamedFile& input) {
+        return contents.at(
+            {option.empty() ? input.option : option + "." + input.option, input.file});
+      }));
+}
+
+// Text of all that the meshes depend on.
+std::string SubjectKey(FileSubject subject, const InputHashes& contents) {
+  subject.landmarks.clear();
+  return ContentText(subject, "subject", contents);
+}
+
+// Returns true if a file that both have has changed.
+bool HasChangedFile(const InputHashes& before, const InputHashes& after) {
+  return std::ranges::any_of(after, [&](const auto& input) {
+    const auto former = before.find(input.first);
+    return former != before.end() && former->second != input.second;
+  });
 }
 
 std::vector<ReferenceHead> ReadReferences(const BenchOptions& options) {
@@ -58,10 +118,16 @@ std::vector<ReferenceHead> ReadReferences(const BenchOptions& options) {
   return heads;
 }
 
-// Text of all that a face depends on, without the edits.
-std::string RunKey(Experiment experiment, const BenchState& state, const fs::path& folder) {
-  experiment.edits.clear();
-  return ShortConfig(experiment, folder) + LandmarksText(state);
+// Hash of all that a face depends on, without the edits.
+std::string RunKey(const Experiment& experiment, const BenchState& state,
+                   const InputHashes& contents) {
+  return Sha256OfText(ContentText(experiment, "", contents) + LandmarksText(state));
+}
+
+std::string HashOfEdits(const BenchState& state) { return Sha256OfText(EditsText(state)); }
+
+std::string FaultsText(const RunResult& result) {
+  return FaultMarks(PlausibilityToJson(result.plausibility)).dump();
 }
 
 bool SameLandmarks(const BenchState& a, const BenchState& b) {
@@ -82,6 +148,7 @@ Bench::Bench(const BenchOptions& options)
     }
     DropAllIncoming(folder_.Root());
     history_ = folder_.Read();
+    subject_options_ = SubjectOptions(folder_.ReadExperiment(CurrentState(history_)));
   } else {
     folder_.CheckFree();
     const BenchBeginning beginning = BeginBench(options.source, folder_.Root(), context);
@@ -107,19 +174,26 @@ void Bench::Commit(BenchHistory history, bool by_job) {
   const BenchState& state = CurrentState(history);
   Experiment experiment = folder_.ReadExperiment(state);
   const FileSubject& files = SubjectFiles(experiment);
-  std::string subject_key = SubjectKey(files);
+  const Experiment keyed = WithoutStateFiles(experiment, state);
+  InputHashes contents = HashInputs(keyed, hashes_);
+  std::string subject_key = SubjectKey(SubjectFiles(keyed), contents);
+  std::string subject_options = SubjectOptions(experiment);
   const bool is_new_subject = !subject_ || subject_key != subject_key_;
-  auto subject = is_new_subject
-                     ? std::make_shared<const BenchSubject>(LoadBenchSubject(files, Context()))
-                     : subject_;
+  auto subject = !is_new_subject ? subject_
+                 : subject_options == subject_options_
+                     ? std::make_shared<const BenchSubject>(LoadOrExplain(files, Context()))
+                     : std::make_shared<const BenchSubject>(LoadBenchSubject(files, Context()));
   LandmarkChecks checks = subject->bone ? CheckLandmarks(ToLandmarkFile(state), subject->skull.mesh,
                                                          *subject->bone, experiment.landmarks)
                                         : LandmarkChecks();
-  std::string present_key = RunKey(experiment, state, folder_.Root());
+  std::string present_key = RunKey(keyed, state, contents);
+  const bool has_changed_file = HasChangedFile(contents_, contents);
   std::shared_ptr<StageCache> stages =
-      is_new_subject || !SameLandmarks(state, CurrentState(history_))
+      is_new_subject || has_changed_file || !SameLandmarks(state, CurrentState(history_))
           ? std::make_shared<StageCache>(kRunStages)
           : run_stages_;
+  std::shared_ptr<StageCache> models =
+      has_changed_file || !models_ ? std::make_shared<StageCache>(kModels) : models_;
   folder_.Write(history, experiment);
   if (!by_job) {
     job_.Cancel();
@@ -128,32 +202,66 @@ void Bench::Commit(BenchHistory history, bool by_job) {
   experiment_ = std::move(experiment);
   subject_ = std::move(subject);
   subject_key_ = std::move(subject_key);
+  subject_options_ = std::move(subject_options);
   checks_ = std::move(checks);
   present_key_ = std::move(present_key);
+  contents_.merge(contents);  // a file that is not named now may be named again
+  for (const auto& [input, content] : contents) {
+    contents_[input] = content;
+  }
   run_stages_ = std::move(stages);
+  models_ = std::move(models);
   subject_revision_ += is_new_subject ? 1 : 0;
   ++revision_;
 }
 
-// Loads the face of an earlier workbench if it belongs to the present state, invariant (5).
-void Bench::LoadStoredRun() {
-  const fs::path key = folder_.Root() / kRunKey, face = folder_.Root() / kBeforeEdits;
+// Commits the present state again if a file that it names has changed on the disk. A fault (of the
+// disk, say) leaves the state; the face is stale then.
+void Bench::NoticeChangedFiles() {
   const BenchState& state = CurrentState(history_);
-  if (!fs::exists(key) || !fs::exists(face)) {
+  const Experiment keyed = WithoutStateFiles(experiment_, state);
+  const std::string key = RunKey(keyed, state, HashInputs(keyed, hashes_));
+  if (key == present_key_) {
     return;
   }
-  const std::string edits = EditsText(state);
-  if (ReadFileBytes(key) == Sha256OfText(present_key_ + edits)) {
-    Case head = CoarseCase(*subject_, experiment_, state);
-    face_.emplace(RunFace{ReadHSpline(face), std::move(head.dowels_on_bone), std::move(head.notes),
-                          present_key_, edits});
-    face_revision_ = revision_;
+  try {
+    Commit(history_);
+  } catch (const Error&) {
+    present_key_ = key;
   }
+}
+
+// Loads the face of an earlier workbench, invariant (5).
+void Bench::LoadStoredRun() {
+  const fs::path key = folder_.Root() / kRunKey, face = folder_.Root() / kBeforeEdits,
+                 faults = folder_.Root() / kRunFaults;
+  if (!fs::exists(key) || !fs::exists(face) || !fs::exists(faults)) {
+    return;
+  }
+  std::istringstream keys(ReadFileBytes(key));
+  RunFace stored{.before_edits = ReadHSpline(face),
+                 .dowels = {},
+                 .notes = {},
+                 .faults = ReadFileBytes(faults),
+                 .key = {},
+                 .edits = {}};
+  keys >> stored.key >> stored.edits;
+  if (stored.key == present_key_) {
+    try {
+      Case head = CoarseCase(*subject_, experiment_, CurrentState(history_));
+      stored.dowels = std::move(head.dowels_on_bone);
+      stored.notes = std::move(head.notes);
+    } catch (const InputError& error) {  // another version of the program judges the input
+      stored.notes = {error.what()};
+    }
+  }
+  face_ = std::move(stored);
+  face_revision_ = revision_;
 }
 
 // Hash of all that the variants' faces depend on.
 std::string Bench::VariantsKey() const {
-  return Sha256OfText(present_key_ + EditsText(CurrentState(history_)));
+  return Sha256OfText(present_key_ + HashOfEdits(CurrentState(history_)));
 }
 
 Experiment Bench::MakeVariantExperiment(BenchVariant variant) const {
@@ -170,14 +278,19 @@ bool Bench::HasVariant(BenchVariant variant) const {
 void Bench::LoadStoredVariants() {
   if (subject_->bone && fs::exists(folder_.Root() / "variants")) {
     variants_ = StoredVariants(folder_.Root(), VariantsKey(), [this](BenchVariant variant) {
-      return CoarseCase(*subject_, MakeVariantExperiment(variant), CurrentState(history_))
-          .dowels_on_bone;
+      try {
+        return CoarseCase(*subject_, MakeVariantExperiment(variant), CurrentState(history_))
+            .dowels_on_bone;
+      } catch (const InputError&) {  // as in LoadStoredRun
+        return std::vector<Dowel>();
+      }
     });
   }
 }
 
-Bench::Snapshot Bench::TakeSnapshot() const {
+Bench::Snapshot Bench::TakeSnapshot() {
   const Lock lock(mutex_);
+  NoticeChangedFiles();
   Snapshot shot{.revision = revision_,
                 .subject_revision = subject_revision_,
                 .history = history_,
@@ -189,7 +302,7 @@ Bench::Snapshot Bench::TakeSnapshot() const {
     shot.has_face = true;
     shot.face_revision = face_revision_;
     shot.face_fresh = face_->key == present_key_;
-    shot.run_saved = shot.face_fresh && face_->edits == EditsText(CurrentState(history_));
+    shot.run_saved = shot.face_fresh && face_->edits == HashOfEdits(CurrentState(history_));
   }
   const std::string key = variants_.empty() ? "" : VariantsKey();
   for (const auto& [variant, made] : variants_) {
@@ -294,8 +407,8 @@ std::vector<std::string> Bench::PartsOfFace() const {
   std::vector<std::string> names;
   for (const TemplateFeature& feature :
        models_
-           .Get<TemplateFace>(StageKey("template", experiment_.face_template),
-                              [&] { return LoadTemplate(experiment_.face_template); })
+           ->Get<TemplateFace>(StageKey("template", experiment_.face_template),
+                               [&] { return LoadTemplate(experiment_.face_template); })
            ->features) {
     names.push_back(feature.name);
   }
@@ -317,8 +430,8 @@ void Bench::KeepFeature(const std::string& part, const std::string& name) {
   const Lock lock(mutex_);
   const HSplineSurface surface = Edited(FreshFace());
   const auto generic =
-      models_.Get<TemplateFace>(StageKey("template", experiment_.face_template),
-                                [&] { return LoadTemplate(experiment_.face_template); });
+      models_->Get<TemplateFace>(StageKey("template", experiment_.face_template),
+                                 [&] { return LoadTemplate(experiment_.face_template); });
   const auto found = std::ranges::find(generic->features, part, &TemplateFeature::name);
   if (found == generic->features.end()) {
     throw InputError(fmt::format("features: the template has no part '{}'", part));
@@ -354,47 +467,49 @@ void Bench::BlendFeature(const std::string& name, double weight) {
       ReplaceEdits(CurrentState(history_), WithOffsets(CurrentState(history_).edits, offsets))));
 }
 
-// Cached, because the page requests a tried option again once a person keeps it.
-BenchFace Bench::MakeCoarse(const BenchSubject& subject, const Experiment& experiment,
-                            const BenchState& state) const {
-  if (!subject.bone) {
+// Copies what a coarse face is made of, so that it is made without mutex_.
+Bench::CoarseParts Bench::CopyParts() const {
+  const Lock lock(mutex_);
+  return {.subject = subject_,
+          .subject_key = subject_key_,
+          .models = models_,
+          .experiment = experiment_,
+          .state = CurrentState(history_)};
+}
+
+// Cached, because the page requests a tried option again once a person keeps it. The key has the
+// meshes as they were loaded.
+BenchFace Bench::MakeCoarse(const CoarseParts& parts) const {
+  if (!parts.subject->bone) {
     throw InputError("there is no skull yet; open one first");
   }
-  const std::string key = RunKey(experiment, state, folder_.Root()) + EditsText(state);
+  const Experiment keyed = WithoutStateFiles(parts.experiment, parts.state);
+  const std::string key = parts.subject_key + EditsText(parts.state) +
+                          RunKey(keyed, parts.state, HashInputs(keyed, hashes_));
   return *coarse_.Get<BenchFace>(key, [&] {
     const auto start = std::chrono::steady_clock::now();
-    BenchFace face = CoarseFace(subject, experiment, state, models_, Context());
+    BenchFace face =
+        CoarseFace(*parts.subject, parts.experiment, parts.state, *parts.models, Context());
     face.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return face;
   });
 }
 
 BenchFace Bench::Coarse(BenchVariant variant) const {
-  std::shared_ptr<const BenchSubject> subject;
-  Experiment experiment;
-  BenchState state;
-  {
-    const Lock lock(mutex_);
-    subject = subject_;
-    experiment = experiment_;
-    state = CurrentState(history_);
+  CoarseParts parts = CopyParts();
+  BenchFace face = MakeCoarse(parts);
+  if (variant != BenchVariant::kAsIs) {
+    parts.experiment = VariantExperiment(parts.experiment, variant, face.dowels, kUsualSd_mm);
+    face = MakeCoarse(parts);
   }
-  BenchFace face = MakeCoarse(*subject, experiment, state);
-  return variant == BenchVariant::kAsIs
-             ? face
-             : MakeCoarse(*subject,
-                          VariantExperiment(experiment, variant, face.dowels, kUsualSd_mm), state);
+  return face;
 }
 
 BenchFace Bench::CoarseWith(const BenchSetting& setting) const {
-  std::shared_ptr<const BenchSubject> subject;
-  BenchState state;
-  {
-    const Lock lock(mutex_);
-    subject = subject_;
-    state = ChangeSetting(CurrentState(history_), setting.path, setting.value);
-  }
-  return MakeCoarse(*subject, folder_.ReadExperiment(state), state);
+  CoarseParts parts = CopyParts();
+  parts.state = ChangeSetting(parts.state, setting.path, setting.value);
+  parts.experiment = folder_.ReadExperiment(parts.state);
+  return MakeCoarse(parts);
 }
 
 BenchFace Bench::Full() const {
@@ -402,7 +517,7 @@ BenchFace Bench::Full() const {
   if (!face_) {
     throw InputError("there is no full run yet");
   }
-  return {Edited(*face_), face_->dowels, face_->notes};
+  return {Edited(*face_), face_->dowels, face_->notes, face_->faults};
 }
 
 BenchFace Bench::FullVariant(BenchVariant variant) const {
@@ -417,8 +532,9 @@ BenchFace Bench::FullVariant(BenchVariant variant) const {
 // The face of the run if the variant is kAsIs and that face is fresh.
 std::optional<BenchFace> Bench::FaceAsIs(BenchVariant variant) const {
   const bool is_fresh = variant == BenchVariant::kAsIs && face_ && face_->key == present_key_;
-  return is_fresh ? std::optional(BenchFace{Edited(*face_), face_->dowels, face_->notes})
-                  : std::nullopt;
+  return is_fresh
+             ? std::optional(BenchFace{Edited(*face_), face_->dowels, face_->notes, face_->faults})
+             : std::nullopt;
 }
 
 void Bench::MakeVariant(BenchVariant variant, int revision, const RunContext& context) {
@@ -436,7 +552,8 @@ void Bench::MakeVariant(BenchVariant variant, int revision, const RunContext& co
   }
   if (!face) {
     const RunResult result = Run(experiment, context, stages.get());
-    face = {result.fit.surface, result.subject.dowels_on_bone, result.subject.notes};
+    face = {result.fit.surface, result.subject.dowels_on_bone, result.subject.notes,
+            FaultsText(result)};
   }
   const Lock lock(mutex_);
   if (revision != revision_) {
@@ -453,6 +570,7 @@ void Bench::StartJob(const std::string& name, const std::function<Work()>& prepa
   const Lock starting(starting_);
   job_.Stop();
   const Lock lock(mutex_);
+  NoticeChangedFiles();  // so that present_key_ is of files as they are before the work
   job_.Start(name, options_.threads, prepare());
 }
 
@@ -500,10 +618,15 @@ RunFace Bench::MakeRun(const Experiment& experiment, const RunContext& context, 
     throw Cancelled();  // the state has changed since the run read its files
   }
   staged.Publish();
-  RunFace face{result.before_edits.value_or(result.fit.surface), result.subject.dowels_on_bone,
-               result.subject.notes, present_key_, EditsText(CurrentState(history_))};
+  RunFace face{result.before_edits.value_or(result.fit.surface),
+               result.subject.dowels_on_bone,
+               result.subject.notes,
+               FaultsText(result),
+               present_key_,
+               HashOfEdits(CurrentState(history_))};
   WriteHSpline(folder_.Root() / kBeforeEdits, face.before_edits);
-  WriteFileAtomically(folder_.Root() / kRunKey, Sha256OfText(face.key + face.edits));
+  WriteFileAtomically(folder_.Root() / kRunFaults, face.faults);
+  WriteFileAtomically(folder_.Root() / kRunKey, face.key + "\n" + face.edits + "\n");
   face_ = face;
   face_revision_ = ++revision_;
   return face;

@@ -21,16 +21,18 @@
 //                    a stored run is found    edits change
 //        NO FACE ----------------> SAVED <--------------------> UNSAVED
 //                                   |  ^                           |  ^
-//               landmarks, options  |  |  the same changed back,   |  |
-//               or subject change   v  |  by undo for example      v  |
+//               landmarks, options, |  |  the same changed back,   |  |
+//               subject or a file   |  |  by undo for example      |  |
+//               on the disk change  v  |                           v  |
 //                                  STALE  <-------------------> STALE
 //                                     any change of state; the end of a run leads to SAVED
 //
 //        SAVED:   has_face, face_fresh, run_saved. run/ holds this face with the present edits.
 //        UNSAVED: has_face, face_fresh. run/ holds this face with other edits. Pulls and features
 //                 work in SAVED and UNSAVED only.
-//        STALE:   has_face. The face belongs to other landmarks, options or another subject. It is
-//                 kept, because undo may make it fresh again. Full() still returns it.
+//        STALE:   has_face. The face belongs to other landmarks, options, contents of files or
+//                 another subject. It is kept, because undo may make it fresh again. Full() still
+//                 returns it.
 //
 //      Variants (variants_) are fresh or stale alike, except that a change of edits makes them
 //      stale too.
@@ -57,20 +59,24 @@
 //       one of these writes fails, workbench.yaml is a step ahead until the next Commit. If the
 //       process ends between them, the next workbench reads workbench.yaml and writes the others.
 //   (3) subject_ holds the meshes that the files of subject_key_ contained when they were loaded.
-//       They are loaded again only when another file, axis or unit is chosen.
-//   (4) face_ is fresh if and only if face_->key == present_key_; a variant, if and only if its key
-//       is VariantsKey(). Faces are never deleted when they become stale.
-//   (5) run_key.txt is written after run/ and kBeforeEdits. A later workbench uses a stored face
-//       only if this hash belongs to its own current step, edits included.
+//       TakeSnapshot and the start of a job notice files that have changed on the disk (by size and
+//       times, then by hash), and commit the present state again.
+//   (4) Keys are made of options and of the contents of files, never of paths. face_ is fresh if
+//       and only if face_->key == present_key_; a variant, if and only if its key is VariantsKey().
+//       Faces are never deleted when they become stale. The key of a run is that of the files
+//       before the run read them, so a file that changes meanwhile makes the face stale.
+//   (5) run_key.txt, with the keys of the face and of the edits, is written after run/ and
+//       kBeforeEdits. A later workbench compares both with its own current step.
 //   (6) revision_ grows with every Commit, every kept feature and every finished run.
 //       subject_revision_ grows with every new subject_. face_revision_ is the revision at which
 //       face_ was set.
 //   (7) A job copies the state and its revision under mutex_ and works without it. It publishes its
 //       result under mutex_ only if revision_ is still the same; otherwise it throws Cancelled. No
 //       result is therefore mixed from two states.
-//   (8) run_stages_ holds intermediate results for one subject and one set of landmarks. Commit
-//       replaces it when either changes. models_ and coarse_ are keyed by all that their values
-//       depend on, and are safe to use without mutex_.
+//   (8) run_stages_ holds intermediate results for one subject and one set of landmarks, models_
+//       templates and priors. Both are keyed by paths, so Commit replaces both when a file has
+//       changed, and run_stages_ also when subject or landmarks change. coarse_ is keyed by all
+//       that its values depend on. All are safe to use without mutex_.
 //   (9) Locks are taken in the order starting_, mutex_. The last step of a job needs mutex_, so
 //       nobody waits for a job while holding it. job_ is the last member, so that the destructor
 //       stops it before anything it uses is destroyed.
@@ -92,6 +98,7 @@
 #include "problems/app/workbench/bench_job.h"
 #include "problems/app/workbench/bench_open.h"
 #include "problems/app/workbench/bench_subject.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/face/pull.h"
 #include "problems/subject/propose/reference_head.h"
 
@@ -109,8 +116,9 @@ struct RunFace {
   HSplineSurface before_edits;
   std::vector<Dowel> dowels;
   std::vector<std::string> notes;
-  std::string key;    // text of the configuration and landmarks, without edits
-  std::string edits;  // text of the edit script that run/ was made with
+  std::string faults;  // BenchFace::faults
+  std::string key;     // hash of the configuration with its files and landmarks, without edits
+  std::string edits;   // hash of the edit script that run/ was made with
 };
 
 // Safe to use from several threads. A method that throws leaves the state unchanged.
@@ -136,7 +144,7 @@ class Bench {
     int face_revision = 0;
     std::vector<BenchVariant> variants = {};  // those with a fresh full face
   };
-  Snapshot TakeSnapshot() const;
+  Snapshot TakeSnapshot();
 
   const std::filesystem::path& Folder() const { return folder_.Root(); }
 
@@ -194,6 +202,7 @@ class Bench {
   void StartJob(const std::string& name, const std::function<Work()>& prepare);
   void CheckSkull() const;
   void Commit(BenchHistory history, bool by_job = false);
+  void NoticeChangedFiles();
   void LoadStoredRun();
   RunFace MakeRun(const Experiment& experiment, const RunContext& context, int revision);
   std::string VariantsKey() const;
@@ -206,8 +215,15 @@ class Bench {
                            const RunContext& context);
   std::string Propose(const RunContext& context);
   std::string Open(const OpenRequest& request, const RunContext& context);
-  BenchFace MakeCoarse(const BenchSubject& subject, const Experiment& experiment,
-                       const BenchState& state) const;
+  struct CoarseParts {
+    std::shared_ptr<const BenchSubject> subject;
+    std::string subject_key;
+    std::shared_ptr<StageCache> models;
+    Experiment experiment;
+    BenchState state;
+  };
+  CoarseParts CopyParts() const;
+  BenchFace MakeCoarse(const CoarseParts& parts) const;
   const RunFace& FreshFace() const;
   HSplineSurface Edited(const RunFace& face) const;
   RunContext Context() const;
@@ -221,12 +237,14 @@ class Bench {
   Experiment experiment_;
   LandmarkChecks checks_;
   std::shared_ptr<const BenchSubject> subject_;
-  std::string subject_key_, present_key_;
+  std::string subject_key_, subject_options_, present_key_;
+  mutable FileHashes hashes_;
+  InputHashes contents_;  // of all files that were named so far
   int revision_ = 1, subject_revision_ = 1, face_revision_ = 0;
   std::optional<RunFace> face_;
   VariantFaces variants_;
-  mutable StageCache models_{6};  // templates and priors, which no file of the folder changes
-  mutable StageCache coarse_{8};  // coarse faces: the last ones tried, and the six variants
+  std::shared_ptr<StageCache> models_;  // templates and priors
+  mutable StageCache coarse_{8};        // coarse faces: the last ones tried, and the six variants
   std::shared_ptr<StageCache> run_stages_;  // of one subject and one set of landmarks
   BenchJob job_;                            // last: destroyed and stopped first
 };

@@ -69,7 +69,7 @@ Json ParseBody(const BenchRequest& request) {
   }
 }
 
-BenchReply StateReply(const Bench& bench) {
+BenchReply StateReply(Bench& bench) {
   return JsonReply(SnapshotJson(bench.TakeSnapshot(), bench.Folder()));
 }
 
@@ -225,7 +225,14 @@ Vec3 ReadVector(const Json& json, const char* key) {
   return {numbers[0], numbers[1], numbers[2]};
 }
 
-std::string ReadText(const Json& json, const char* key) { return json.at(key).get<std::string>(); }
+// A NUL would end a path early for the system, but not for the checks of its name.
+std::string ReadText(const Json& json, const char* key) {
+  std::string text = json.at(key).get<std::string>();
+  if (text.find('\0') != std::string::npos) {
+    throw InputError(fmt::format("{}: the text has the character NUL; leave it out", key));
+  }
+  return text;
+}
 
 template <class Enum>
 Enum ReadEnum(const Json& json, const char* key) {

@@ -174,6 +174,97 @@ TEST_F(WorkbenchBench, ARunOfTheFolderGivesTheSameFaceWithItsEdits) {
   EXPECT_GT((bench.Full().surface.Point({0.5, 0.5}) - nose).norm(), 1);
 }
 
+// Multiplies all points of a mesh file by a factor.
+void Scale(const fs::path& file, double factor) {
+  TriMesh mesh = ReadMesh(file);
+  for (Vec3& p : mesh.points) {
+    p *= factor;
+  }
+  WriteFileAtomically(file, EncodeMesh(mesh, ".ply"));
+}
+
+// Adds a comment, and so changes the content alone.
+void Touch(const fs::path& file) { WriteFileAtomically(file, ReadFileBytes(file) + "# more\n"); }
+
+// For each kind of input: changed while the workbench runs, changed back, and changed between two
+// workbenches.
+TEST_F(WorkbenchBench, AFileThatChangesOnTheDiskMakesTheFaceStale) {
+  const fs::path root = folder_ / "bench", skull = root / "subject/skull.ply",
+                 table = root / "tables/rhine_caucasoid.yaml";
+  const auto set = [](const char* path, const char* value) {
+    return [=](BenchState s) { return ChangeSetting(std::move(s), path, value); };
+  };
+  {
+    Bench bench(Options());
+    bench.Apply("depths", set("tissue.depths", "\"table\""));
+    bench.Apply("table", set("tissue.table", "\"tables/rhine_caucasoid.yaml\""));
+    RunUntilEnd(bench);
+    const std::string table_text = ReadFileBytes(table);
+    EXPECT_TRUE(bench.TakeSnapshot().run_saved);
+    Touch(table);
+    EXPECT_TRUE(bench.TakeSnapshot().has_face);
+    EXPECT_FALSE(bench.TakeSnapshot().face_fresh);
+    EXPECT_FALSE(bench.TakeSnapshot().run_saved);
+    WriteFileAtomically(table, table_text);
+    EXPECT_TRUE(bench.TakeSnapshot().run_saved) << "the same content again";
+    const std::string skull_bytes = ReadFileBytes(skull);
+    const double width = Bounds(bench.TakeSnapshot().subject->skull.mesh).sizes().x();
+    Scale(skull, 1.01);
+    EXPECT_FALSE(bench.TakeSnapshot().face_fresh);
+    EXPECT_NEAR(Bounds(bench.TakeSnapshot().subject->skull.mesh).sizes().x(), 1.01 * width, 1e-3)
+        << "the page shows the skull as it is";
+    WriteFileAtomically(skull, skull_bytes);
+    EXPECT_TRUE(bench.TakeSnapshot().face_fresh);
+  }
+  EXPECT_TRUE(Bench(Again()).TakeSnapshot().run_saved);
+  Touch(table);
+  Bench again(Again());
+  EXPECT_TRUE(again.TakeSnapshot().has_face);
+  EXPECT_FALSE(again.TakeSnapshot().face_fresh);
+  EXPECT_FALSE(again.TakeSnapshot().run_saved);
+  RunUntilEnd(again);
+  EXPECT_TRUE(again.TakeSnapshot().run_saved);
+}
+
+// The second run must not use intermediate results of the former contents.
+TEST_F(WorkbenchBench, ARunAfterAChangeOfAFileIsThatOfTheChangedFile) {
+  Bench bench(Options());
+  RunUntilEnd(bench);
+  const HSplineSurface before = bench.Full().surface;
+  Scale(bench.Folder() / "subject/skull.ply", 1.003);
+  RunUntilEnd(bench);
+  EXPECT_TRUE(bench.TakeSnapshot().run_saved);
+  const RunResult run = problems::Run(ReadConfig<Experiment>(bench.Folder() / "config.yaml"), {});
+  EXPECT_EQ(bench.Full().surface.Offsets(), run.fit.surface.Offsets());
+  EXPECT_NE(bench.Full().surface.Offsets(), before.Offsets());
+}
+
+// A person opens it to correct the points, or to repair the file.
+TEST_F(WorkbenchBench, ASkullThatNoLongerFitsOrCannotBeReadStillOpens) {
+  const fs::path skull = folder_ / "bench/subject/skull.ply";
+  {
+    Bench bench(Options());
+    RunUntilEnd(bench);
+  }
+  Scale(skull, 1.1);
+  {
+    Bench bench(Again());
+    const Bench::Snapshot shot = bench.TakeSnapshot();
+    EXPECT_TRUE(shot.has_face);
+    EXPECT_FALSE(shot.face_fresh);
+    EXPECT_THAT(shot.checks.errors, ::testing::Not(::testing::IsEmpty()));
+    bench.PlaceByRay("g", Bounds(shot.subject->skull.mesh).center() - Vec3(0, 500, 0), {0, 1, 0},
+                     Vec3::Zero());
+  }
+  const std::string bytes = ReadFileBytes(skull);
+  WriteFileAtomically(skull, bytes.substr(0, bytes.size() / 2));
+  Bench bench(Again());
+  EXPECT_FALSE(bench.TakeSnapshot().subject->bone);
+  EXPECT_THAT(bench.TakeSnapshot().subject->faults, ::testing::ElementsAre(HasSubstr("skull.ply")));
+  WriteFileAtomically(skull, bytes);
+  EXPECT_TRUE(bench.TakeSnapshot().subject->bone) << "repaired while the workbench runs";
+}
+
 TEST_F(WorkbenchBench, AChangeDuringARunDiscardsItsResult) {
   Bench bench(Options());
   bench.StartRun();
