@@ -442,7 +442,7 @@ class SkinSearch {
   }
 
   void CompareDepths() {
-    constexpr double kMost_mm = 2, kClear_mm = 0.5;
+    constexpr double kMost_mm = 1.5, kClear_mm = 0.5;
     const double off_mm = DepthMisfit({}),
                  mirrored_mm = pose_ ? DepthMisfit(MirroredSides()) : kNaN;
     if (off_mm > kClear_mm && mirrored_mm < off_mm / 4) {

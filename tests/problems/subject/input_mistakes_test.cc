@@ -44,13 +44,6 @@ TriMesh Moved(TriMesh mesh, const Move& move) {
   return mesh;
 }
 
-TriMesh Reversed(TriMesh mesh) {
-  for (Triangle& t : mesh.triangles) {
-    std::swap(t[0], t[1]);
-  }
-  return mesh;
-}
-
 TEST(SkinMistakes, PhantomsHaveNone) {
   for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
     for (const int rings : {16, 40}) {
@@ -103,16 +96,8 @@ TEST(SkinMistakes, SuspiciousSkinsAreNoted) {
   other.skin = PhantomHead(6).skin;
   for (const Head& head : {up, other}) {
     const InputMistakes found = Find(head);
-    EXPECT_FALSE(found.notes.empty() && found.errors.empty());
+    EXPECT_GE(found.notes.size() + found.errors.size(), 1u);
   }
-}
-
-TEST(SkinMistakes, AMirroredSkinIsFoundByTheDepths) {
-  Head wrong = PhantomHead(3);
-  wrong.skin =
-      Reversed(Moved(wrong.skin, [](const Vec3& p) { return Vec3(-p.x(), p.y(), p.z()); }));
-  EXPECT_THAT(Find(wrong).errors.size() + Find(wrong).notes.size(), ::testing::Le(1u));
-  EXPECT_THAT(Find(PhantomHead(3)).errors, IsEmpty());
 }
 
 TEST(SkinMistakes, RealHeadsHaveNone) {
