@@ -6,17 +6,18 @@
 #include <openssl/crypto.h>
 #include <sys/random.h>
 
+#include <algorithm>
 #include <array>
 #include <charconv>
-#include <chrono>
 #include <cstdint>
-#include <future>
+#include <functional>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
 
 #include "problems/app/workbench/bench_api.h"
+#include "problems/app/workbench/http_connections.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
@@ -49,6 +50,50 @@ std::optional<std::uint64_t> ParseNumber(const std::string& text) {
   return error == std::errc() && at == end && !text.empty() ? std::optional(number) : std::nullopt;
 }
 
+bool HasControlCharacter(const std::string& text) {
+  return std::ranges::any_of(text, [](unsigned char c) { return c < ' ' || c == 0x7f; });
+}
+
+// A connection as httplib sees it.
+class ConnectionStream : public httplib::Stream {
+ public:
+  explicit ConnectionStream(HttpConnection& connection) : connection_(connection) {}
+
+  // Both wait, if necessary.
+  bool is_readable() const override { return true; }
+  bool is_writable() const override { return true; }
+  ssize_t read(char* bytes, std::size_t size) override { return connection_.Read(bytes, size); }
+  ssize_t write(const char* bytes, std::size_t size) override {
+    return connection_.Write(bytes, size);
+  }
+  void get_remote_ip_and_port(std::string& ip, int& port) const override { NoAddress(ip, port); }
+  void get_local_ip_and_port(std::string& ip, int& port) const override { NoAddress(ip, port); }
+  socket_t socket() const override { return INVALID_SOCKET; }
+
+ private:
+  static void NoAddress(std::string& ip, int& port) {
+    ip.clear();
+    port = 0;
+  }
+
+  HttpConnection& connection_;
+};
+
+// Answers requests on connections that HttpConnections has accepted.
+class RequestServer : public httplib::Server {
+ public:
+  // httplib stops a reply without a listening socket, which it takes for its own shutdown.
+  RequestServer() { svr_sock_ = 0; }
+
+  // Calls `look` with the request before it is answered. Returns false if the connection must be
+  // closed.
+  bool AnswerOne(HttpConnection& connection, const std::function<void(httplib::Request&)>& look) {
+    ConnectionStream stream(connection);
+    bool must_close = false;
+    return process_request(stream, /*close_connection=*/false, must_close, look) && !must_close;
+  }
+};
+
 void Refuse(const Refusal& refusal, httplib::Response& response) {
   response.status = refusal.status;
   response.set_header("Connection", "close");  // an unread body may follow
@@ -60,11 +105,15 @@ void Refuse(const Refusal& refusal, httplib::Response& response) {
 struct HttpServer::Impl {
   Bench& bench;
   HttpServerOptions options;
-  httplib::Server server;
-  int port = -1;
+  HttpConnections connections;
+  RequestServer server;
+  int port;
 
   Impl(Bench& the_bench, const HttpServerOptions& the_options)
-      : bench(the_bench), options(the_options) {}
+      : bench(the_bench),
+        options(the_options),
+        connections(options.port, options.limits),
+        port(connections.Port()) {}
 
   bool IsOwnHost(const std::string& host) const {
     return host == fmt::format("{}:{}", kHost, port) || host == fmt::format("localhost:{}", port);
@@ -109,6 +158,9 @@ struct HttpServer::Impl {
     if (!path) {
       return Refusal{403, "the address lacks the token; open the one that the program printed"};
     }
+    if (HasControlCharacter(request.path)) {
+      return Refusal{400, "the address has control characters"};
+    }
     const bool posts = request.method == "POST";
     if (!posts && request.method != "GET") {
       return Refusal{405, "only GET and POST are answered"};
@@ -152,10 +204,6 @@ struct HttpServer::Impl {
   }
 
   void Prepare() {
-    server.set_keep_alive_max_count(1000);
-    // httplib writes head and body separately, so that the rest of a body would wait otherwise.
-    server.set_tcp_nodelay(true);
-    server.set_read_timeout(10, 0);
     server.set_payload_max_length(options.max_upload_bytes);
     server.set_default_headers({{"Content-Security-Policy", kPagePolicy},
                                 {"X-Content-Type-Options", "nosniff"},
@@ -179,15 +227,12 @@ struct HttpServer::Impl {
     server.Post(".*", reply);
   }
 
-  void Listen() {
-    const bool listens = options.port == 0 ? (port = server.bind_to_any_port(kHost)) > 0
-                                           : server.bind_to_port(kHost, options.port);
-    if (!listens) {
-      throw IoError(
-          fmt::format("port {} of {} cannot be used; it may be taken: give another --port, or none",
-                      options.port, kHost));
-    }
-    port = options.port == 0 ? port : options.port;
+  // A request that is refused ends its connection, because its body is not read.
+  bool AnswerOne(HttpConnection& connection) {
+    bool is_allowed = false;
+    const bool goes_on = server.AnswerOne(
+        connection, [&](const httplib::Request& request) { is_allowed = !Check(request); });
+    return goes_on && is_allowed;
   }
 };
 
@@ -197,7 +242,6 @@ HttpServer::HttpServer(Bench& bench, const HttpServerOptions& options)
     impl_->options.token = RandomToken();
   }
   impl_->Prepare();
-  impl_->Listen();
 }
 
 HttpServer::~HttpServer() = default;
@@ -209,17 +253,8 @@ std::string HttpServer::Url() const {
 }
 
 void HttpServer::Serve(const std::stop_token& stop) {
-  constexpr std::chrono::milliseconds kStopCheck(20);
-  auto listening = std::async(std::launch::async, [this] { impl_->server.listen_after_bind(); });
-  bool stop_sent = false;
-  while (listening.wait_for(kStopCheck) != std::future_status::ready) {
-    // stop() has no effect on a server that does not run yet.
-    if (!stop_sent && stop.stop_requested() && impl_->server.is_running()) {
-      impl_->server.stop();
-      stop_sent = true;
-    }
-  }
-  listening.get();
+  impl_->connections.Serve(
+      [this](HttpConnection& connection) { return impl_->AnswerOne(connection); }, stop);
 }
 
 std::string RandomToken() {

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "problems/app/workbench/bench.h"
+#include "problems/app/workbench/http_connections.h"
 
 namespace semblance::problems {
 
@@ -17,6 +18,7 @@ struct HttpServerOptions {
   std::string token;                         // first part of every path; empty: a new random one
   std::size_t max_body_bytes = 1 << 20;      // limit of a request's body
   std::size_t max_upload_bytes = 512 << 20;  // limit of a file from the browser
+  HttpLimits limits;                         // of heads and connections
 };
 
 // Every request must have the token in its path (compared in constant time), this machine as its

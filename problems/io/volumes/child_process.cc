@@ -19,6 +19,7 @@
 #include <new>
 #include <string_view>
 
+#include "problems/io/volumes/confinement.h"
 #include "surfaces/base/error.h"
 
 #ifdef SEMBLANCE_COVERAGE
@@ -90,23 +91,40 @@ double UsedMemory_bytes() {
   return pages * static_cast<double>(::sysconf(_SC_PAGESIZE));
 }
 
-// Ends the child with its parent, ignores Ctrl-C (which the parent handles), closes the terminal
-// and limits the memory.
-void PrepareChild(double memory_bytes) {
+// Closes the terminal, and all other files of the parent: among them may be connections of the
+// workbench. Returns the pipe's new descriptor.
+int CloseFiles(int parent_pipe) {
+  const int pipe = ::fcntl(parent_pipe, F_DUPFD_CLOEXEC, STDERR_FILENO + 1);
+  const int null_device = ::open("/dev/null", O_RDWR | O_CLOEXEC);
+  for (const int descriptor : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO}) {
+    ::dup2(null_device, descriptor);
+  }
+  ::close_range(STDERR_FILENO + 1, static_cast<unsigned>(pipe) - 1, 0);
+  ::close_range(static_cast<unsigned>(pipe) + 1, ~0U, 0);
+  return pipe;
+}
+
+// Ends the child with its parent, ignores Ctrl-C (which the parent handles), limits the memory, and
+// takes all rights that reading does not need. Returns the pipe's new descriptor.
+int PrepareChild(const ChildRights& rights, int parent_pipe) {
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   ::signal(SIGINT, SIG_IGN);
   ::signal(SIGTERM, SIG_DFL);
-  const int null_device = ::open("/dev/null", O_WRONLY | O_CLOEXEC);
-  ::dup2(null_device, STDOUT_FILENO);
-  ::dup2(null_device, STDERR_FILENO);
+  const int pipe = CloseFiles(parent_pipe);
   rlimit limit{};
   ::setrlimit(RLIMIT_CORE, &limit);
   ::getrlimit(RLIMIT_AS, &limit);
-  const auto allowed_bytes = static_cast<rlim_t>(UsedMemory_bytes() + memory_bytes);
+  const auto allowed_bytes = static_cast<rlim_t>(UsedMemory_bytes() + rights.memory_bytes);
   if (!IsSanitized() && allowed_bytes < limit.rlim_cur) {
     limit.rlim_cur = allowed_bytes;
     ::setrlimit(RLIMIT_AS, &limit);
   }
+#ifndef SEMBLANCE_COVERAGE  // whose counters are written to files
+  if (!IsSanitized()) {
+    Confine(rights.readable);
+  }
+#endif
+  return pipe;
 }
 
 // Limits the processor time from now on, so that the system ends a library in an endless loop.
@@ -230,12 +248,11 @@ std::string ResultOrThrow(const ChildMessages& last) {
 }  // namespace
 
 std::string RunInChildProcess(const std::function<std::string(const ReportFile&)>& work,
-                              double memory_bytes, const std::stop_token& stop) {
+                              const ChildRights& rights, const std::stop_token& stop) {
   const Pipe pipe = OpenPipe();
   const pid_t child = ::fork();
   if (child == 0) {
-    PrepareChild(memory_bytes);
-    RunAndExit(work, memory_bytes, pipe.in);
+    RunAndExit(work, rights.memory_bytes, PrepareChild(rights, pipe.in));
   }
   ::close(pipe.in);
   const int out = pipe.out;

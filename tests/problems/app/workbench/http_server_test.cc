@@ -12,8 +12,13 @@
 #include <unistd.h>
 
 #include <chrono>
+#include <cstdint>
+#include <fstream>
+#include <limits>
+#include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "problems/subject/phantom.h"
@@ -25,30 +30,63 @@ namespace semblance::problems {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using testing::ScratchFolder;
 using ::testing::StartsWith;
 
-// The whole answer on one connection; empty if the connection is refused.
-std::string Ask(int port, const std::string& bytes, const char* address = "127.0.0.1") {
-  const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
-  sockaddr_in to{};
-  to.sin_family = AF_INET;
-  to.sin_port = htons(static_cast<std::uint16_t>(port));
-  ::inet_pton(AF_INET, address, &to.sin_addr);
-  const timeval patience{.tv_sec = 1, .tv_usec = 0};
-  ::setsockopt(socket, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
-  std::string answer;
-  if (::connect(socket, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0) {
-    ::send(socket, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+// A connection to the server; the test waits at most a second for its bytes.
+class Client {
+ public:
+  explicit Client(int port, const char* address = "127.0.0.1")
+      : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+    sockaddr_in to{};
+    to.sin_family = AF_INET;
+    to.sin_port = htons(static_cast<std::uint16_t>(port));
+    ::inet_pton(AF_INET, address, &to.sin_addr);
+    const timeval patience{.tv_sec = 1, .tv_usec = 0};
+    ::setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    ::setsockopt(socket_, SOL_SOCKET, SO_SNDTIMEO, &patience, sizeof patience);
+    is_connected_ = ::connect(socket_, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0;
+  }
+  ~Client() { ::close(socket_); }
+  Client(const Client&) = delete;
+  Client& operator=(const Client&) = delete;
+
+  // Returns false if the server has closed the connection.
+  bool Send(const std::string& bytes) {
+    return is_connected_ && ::send(socket_, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
+                                static_cast<ssize_t>(bytes.size());
+  }
+
+  // The bytes until the server closes the connection, or until it contains `end`.
+  std::string Receive(const std::string& end = "") {
+    std::string answer;
     char buffer[65536];
-    for (ssize_t n = 0; (n = ::recv(socket, buffer, sizeof buffer, 0)) > 0;) {
+    for (ssize_t n = 0; is_connected_ && (end.empty() || answer.find(end) == answer.npos) &&
+                        (n = ::recv(socket_, buffer, sizeof buffer, 0)) > 0;) {
       answer.append(buffer, static_cast<std::size_t>(n));
     }
+    return answer;
   }
-  ::close(socket);
-  return answer;
+
+ private:
+  int socket_;
+  bool is_connected_ = false;
+};
+
+// The whole answer on one connection; empty if the connection is refused.
+std::string Ask(int port, const std::string& bytes, const char* address = "127.0.0.1") {
+  Client client(port, address);
+  client.Send(bytes);
+  return client.Receive();
+}
+
+double UsedMemory_mb() {
+  double pages = 0, resident = 0;
+  std::ifstream("/proc/self/statm") >> pages >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / 1e6;
 }
 
 // A workbench on a coarse phantom.
@@ -72,6 +110,8 @@ class WorkbenchServer : public ::testing::Test {
     HttpServerOptions options;
     options.max_upload_bytes = 1 << 20;
     options.max_body_bytes = 4096;
+    options.limits.head_time = std::chrono::milliseconds(500);
+    options.limits.max_waiting = 250;
     return options;
   }
 
@@ -281,6 +321,158 @@ TEST_F(WorkbenchServer, AStopDuringTheStartEndsTheServer) {
     const std::jthread serving([&](const std::stop_token& stop) { server.Serve(stop); });
     std::this_thread::sleep_for(std::chrono::microseconds(10 * k));
   }  // each thread is stopped and joined here
+}
+
+TEST(HttpHead, IsReadToItsEndWithTheSizeOfTheBody) {
+  const auto read = [](const std::string& text) { return ReadHead(text, {}); };
+  const std::string get = "GET /a HTTP/1.1\r\nHost: x\r\n\r\n";
+  EXPECT_EQ(read(get + "more").size, get.size());
+  EXPECT_EQ(read(get).body, 0u);
+  for (std::size_t bytes = 0; bytes < get.size(); ++bytes) {
+    EXPECT_EQ(read(get.substr(0, bytes)).size, 0u) << bytes;
+    EXPECT_EQ(read(get.substr(0, bytes)).fault, 0) << bytes;
+  }
+  const auto body = [&](const std::string& headers) {
+    return read("POST / HTTP/1.1\r\n" + headers + "\r\n\r\n").body;
+  };
+  EXPECT_EQ(body("content-length:  17 "), 17u);
+  EXPECT_EQ(body("Content-Length: -1"), std::numeric_limits<std::uint64_t>::max());
+  EXPECT_EQ(body("Content-Length: 1e3"), std::numeric_limits<std::uint64_t>::max());
+  EXPECT_EQ(body("Transfer-Encoding: chunked"), std::numeric_limits<std::uint64_t>::max());
+}
+
+TEST(HttpHead, IsRefusedBeyondItsLimitsAndIfTwoReadersCouldDiffer) {
+  const auto fault = [](const std::string& text) { return ReadHead(text, {}).fault; };
+  const auto with = [&](const std::string& headers) {
+    return fault("POST / HTTP/1.1\r\nHost: x\r\n" + headers + "\r\n");
+  };
+  EXPECT_EQ(fault("GET /" + std::string(8192, 'a')), 431);
+  EXPECT_EQ(fault("GET / HTTP/1.1\r\nA: " + std::string(8192, 'a') + "\r\n\r\n"), 431);
+  std::string lines;
+  for (int k = 0; k < 98; ++k) {
+    lines += "A: b\r\n";
+  }
+  EXPECT_EQ(with(lines), 0);
+  EXPECT_EQ(with(lines + "A: b\r\n"), 431);
+  for (const char* wrong :
+       {"Content-Length: 1\r\nContent-Length: 2\r\n", "Content-Length: 1\r\ncontent-length: 1\r\n",
+        "Content-Length: 1\r\nTransfer-Encoding: chunked\r\n", "Content-Length : 1\r\n",
+        " folded: 1\r\n", "A: b\r\n folded\r\n", "no header\r\n", ": 1\r\n", "A: b\nB: c\r\n",
+        "A: b\rB: c\r\n", "A: \x01\r\n", "A\x7f: b\r\n", "Range: bytes=0-1\r\n"}) {
+    EXPECT_EQ(with(wrong), 400) << wrong;
+  }
+  EXPECT_EQ(with(std::string("A: b\0c\r\n", 8)), 400);
+  EXPECT_EQ(fault("GET / HTTP/1.1\n\n"), 400) << "at once, not after the time of a head";
+}
+
+TEST_F(WorkbenchServer, ARequestWithTwoMeaningsIsRefused) {
+  const std::string head =
+      fmt::format("POST /{}/api/act HTTP/1.1\r\nHost: {}\r\n{}Content-Type: application/json\r\n",
+                  Token(), Host(), OwnOrigin());
+  for (const char* lengths :
+       {"Content-Length: 2\r\nContent-Length: 4\r\n", "Content-Length: 2\r\nContent-Length: 2\r\n",
+        "Content-Length: 2\r\nTransfer-Encoding: chunked\r\n"}) {
+    EXPECT_THAT(Ask(server_.Port(), head + lengths + "\r\n{}{}"),
+                AllOf(StartsWith("HTTP/1.1 400"), HasSubstr("Content-Length")))
+        << lengths;
+  }
+  // A body that is not read is no next request.
+  const std::string inner =
+      fmt::format("GET /{}/api/state HTTP/1.1\r\nHost: {}\r\n\r\n", Token(), Host());
+  for (const std::string& outer :
+       {fmt::format("GET /{}/api/sites HTTP/1.1\r\nHost: {}\r\nContent-Length: {}\r\n\r\n", Token(),
+                    Host(), inner.size()),
+        fmt::format("GET /{}/api/sites HTTP/1.1\r\nHost: {}\r\nTransfer-Encoding: chunked\r\n\r\n",
+                    Token(), Host())}) {
+    EXPECT_THAT(Ask(server_.Port(), outer + inner), Not(HasSubstr("\"landmarks\""))) << outer;
+  }
+}
+
+TEST_F(WorkbenchServer, NoControlCharacterInAnAddressIsAccepted) {
+  std::filesystem::create_directories(folder_ / "bench/run");
+  WriteFileAtomically(folder_ / "bench/run/a.txt", "text");
+  EXPECT_THAT(GetBelow("run/a.txt"), StartsWith("HTTP/1.1 200"));
+  for (const char* path : {"run/a.txt%00.png", "run/a.txt%00", "run/a.txt%0a", "run/a.txt%0D%0Ab",
+                           "run/a.txt%7f", "run/a.txt%u0000.png", "%00"}) {
+    EXPECT_THAT(GetBelow(path), StartsWith("HTTP/1.1 400")) << path;
+  }
+  EXPECT_THAT(Post("api/look", R"({"path": "/a.ply\u0000.png"})", OwnOrigin()),
+              HasSubstr("the character NUL"));
+}
+
+TEST_F(WorkbenchServer, RequestsFollowEachOtherOnAConnection) {
+  const std::string request =
+      fmt::format("GET /{}/api/sites HTTP/1.1\r\nHost: {}\r\n\r\n", Token(), Host());
+  const std::string post = fmt::format(
+      "POST /{}/api/act HTTP/1.1\r\nHost: {}\r\n{}Content-Type: application/json\r\n"
+      "Content-Length: {}\r\n\r\n",
+      Token(), Host(), OwnOrigin(), 48);
+  const std::string body = R"({"do": "set", "path": "title", "value": "third"})";
+  ASSERT_EQ(body.size(), 48u);
+  Client client(server_.Port());
+  for (int k = 0; k < 3; ++k) {
+    ASSERT_TRUE(client.Send(request));
+    EXPECT_THAT(client.Receive("]"), StartsWith("HTTP/1.1 200"));
+  }
+  Client pipelined(server_.Port());  // all at once, and the last body in two parts
+  ASSERT_TRUE(pipelined.Send(request + post + body.substr(0, 20)));
+  std::this_thread::sleep_for(std::chrono::milliseconds(20));
+  ASSERT_TRUE(pipelined.Send(body.substr(20)));
+  EXPECT_THAT(pipelined.Receive("third"), HasSubstr("third"));
+}
+
+// Other people of the machine need no token to connect.
+TEST_F(WorkbenchServer, EndlessHeadsTakeNoMemory) {
+  const std::string mega(1 << 20, 'a');
+  std::string headers;
+  while (headers.size() < mega.size()) {
+    headers += fmt::format("A{}: b\r\n", headers.size());
+  }
+  const double before = UsedMemory_mb();
+  for (const auto& [start, more] :
+       {std::pair("GET /", mega), std::pair("GET / HTTP/1.1\r\nA: ", mega),
+        std::pair("GET / HTTP/1.1\r\n", headers)}) {
+    Client client(server_.Port());
+    client.Send(start);
+    int sent_mb = 0;
+    while (sent_mb < 50 && client.Send(more)) {
+      ++sent_mb;
+    }
+    EXPECT_LT(sent_mb, 50) << start;
+  }
+  EXPECT_LT(UsedMemory_mb() - before, 20);
+}
+
+TEST_F(WorkbenchServer, SlowClientsKeepNobodyWaitingAndAreClosed) {
+  std::vector<std::unique_ptr<Client>> slow;
+  const std::string post =
+      fmt::format("POST /{}/api/act HTTP/1.1\r\nHost: {}\r\n", Token(), Host());
+  for (int k = 0; k < 200; ++k) {
+    slow.push_back(std::make_unique<Client>(server_.Port()));
+    EXPECT_TRUE(slow.back()->Send(k % 2 == 0 ? "G" : post));
+  }
+  for (int k = 0; k < 5; ++k) {
+    for (const auto& client : slow) {
+      client->Send(k == 0 ? "E" : "x");
+    }
+    const auto start = std::chrono::steady_clock::now();
+    EXPECT_THAT(GetBelow("api/state"), StartsWith("HTTP/1.1 200"));
+    EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(1));
+  }
+  // Listening() allows a head half a second.
+  std::this_thread::sleep_for(std::chrono::milliseconds(600));
+  for (const auto& client : slow) {
+    EXPECT_THAT(client->Receive(), AnyOf(StartsWith("HTTP/1.1 408"), StartsWith("HTTP/1.1 400")));
+  }
+}
+
+TEST_F(WorkbenchServer, AFloodOfConnectionsClosesTheOldestOnes) {
+  std::vector<std::unique_ptr<Client>> flood;
+  for (int k = 0; k < 400; ++k) {  // Listening() allows 250
+    flood.push_back(std::make_unique<Client>(server_.Port()));
+  }
+  EXPECT_THAT(GetBelow("api/state"), StartsWith("HTTP/1.1 200"));
+  EXPECT_EQ(flood.front()->Receive(), "");
 }
 
 TEST_F(WorkbenchServer, OnlyOneLoopbackAddressAnswers) {
