@@ -207,7 +207,7 @@ bool HaveOneWeight(const NestedPoints& points, std::size_t a, std::size_t b) {
 
 // Separates points that lie much closer together than their spacing and have one displacement.
 void SeparateClosest(NestedPoints& points) {
-  constexpr double kPlace = 1e-3, kValue = 1e-2;  // shares of the spacing and of the range
+  constexpr double kPlace = 1e-3, kValue = 1e-3;  // shares of the spacing and of the range
   const BlockRanges ranges(points);
   const auto are_alike = [&](std::size_t a, std::size_t b) {
     return (points.value[a] - points.value[b]).norm() <= kValue * ranges.At(a).value_mm &&

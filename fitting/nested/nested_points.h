@@ -91,7 +91,7 @@ inline double PlaceDistance(const NestedPoints& points, std::size_t a, std::size
 // - exact copies;
 // - points nearer to another than a thousandth of the points' spacing, whose displacements differ
 // by
-//   less than a hundredth of the range around them;
+//   less than a thousandth of the range around them;
 // - points nearer than a twentieth of the spacing, if they are at least a sixth of all points and
 //   differ from their neighbour by less than half of the noise. They then share its error, as in a
 //   second export, and would make the noise look smaller. Points that were measured twice stay.

@@ -86,7 +86,9 @@ void CheckSpread(std::span<const Vec2> uv) {
     FailParameters(fmt::format(
         "the given (u,v) are all {}, so they determine no surface; give each point its own place, "
         "or leave the columns out",
-        trace > 0 ? "on one line" : fmt::format("({:.4g}, {:.4g})", mean.x(), mean.y())));
+        std::ranges::any_of(uv, [&](const Vec2& p) { return p != uv[0]; })
+            ? "on one line"
+            : fmt::format("({:.4g}, {:.4g})", uv[0].x(), uv[0].y())));
   }
 }
 

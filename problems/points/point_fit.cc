@@ -21,6 +21,7 @@
 #include "problems/points/fit_files.h"
 #include "problems/report/plain_names.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance::problems {
 namespace {
@@ -714,6 +715,31 @@ void RestoreOrder(const PointsOut& out, PointFit& result) {
   }
 }
 
+// States that a part of the points lies much farther from the surface than most; empty if none
+// does, or if those are outliers.
+std::string TailText(const FitResult& fit) {
+  constexpr double kLongTail = 3;  // RMS over median; 1.5 for normal errors, 2 for Laplace's
+  std::vector<double> distances;
+  for (std::uint32_t k = 0; fit.automatic && k < fit.residual_mm.size(); ++k) {
+    if (!std::ranges::binary_search(fit.automatic->outliers, k)) {
+      distances.push_back(fit.residual_mm[k]);
+    }
+  }
+  if (distances.empty() || fit.automatic->met_to_rounding) {
+    return "";
+  }
+  const double rms_mm = RootMeanSquare(distances), median_mm = UpperMedian(distances);
+  return rms_mm > kLongTail * median_mm
+             ? fmt::format(
+                   "the distances have a long tail: half of the points lie within {:.3g} mm, and "
+                   "the "
+                   "RMS is {:.3g} mm; many points may be gross errors that were not recognised, "
+                   "and "
+                   "the surface follows them; clean the points, and fit again",
+                   median_mm, rms_mm)
+             : "";
+}
+
 std::string LeftOutText(const PointsOut& out) {
   constexpr std::size_t kMostNamed = 5;
   std::string named;
@@ -847,6 +873,9 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
     AddSigma(given, start, step, result);
   }
   ConvertWeights(options.fit.terms, result.fit);
+  if (std::string tail = TailText(result.fit); !tail.empty()) {
+    notes.push_back(std::move(tail));
+  }
   if (!result.attributes.empty()) {
     result.attributes = std::move(given_attributes);
   }

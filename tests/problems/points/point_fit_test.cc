@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <numbers>
 #include <string>
@@ -18,6 +19,8 @@
 #include "problems/config/config.h"
 #include "problems/points/fit_files.h"
 #include "problems/points/fit_report.h"
+#include "problems/points/point_files.h"
+#include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/hspline_query/tessellate.h"
@@ -329,6 +332,172 @@ TEST(PointFit, ConfigurationRoundTrips) {
   EXPECT_THAT(OptionsReference<PointFitOptions>(), HasSubstr("number or auto"));
   const auto schema = nlohmann::json::parse(OptionsSchema<PointFitOptions>());
   EXPECT_TRUE(schema["properties"].contains("parameters"));
+}
+
+// Heights as of the files of data/field, with noise 0.01.
+PointTable Hills(int count, double width_mm, double noise_mm, std::uint64_t random_seed) {
+  Random random(random_seed);
+  PointTable table;
+  for (int k = 0; k < count; ++k) {
+    const double x = random.Uniform(0, width_mm), y = random.Uniform(0, width_mm);
+    table.positions.emplace_back(
+        x, y, 4 * std::sin(x / 9) * std::cos(y / 13) + noise_mm * random.Normal());
+  }
+  return table;
+}
+
+// The distance of the surface's heights from the hills.
+double ErrorOfHills(const HSplineSurface& surface) {
+  double sum = 0;
+  for (int k = 0; k < 900; ++k) {
+    const Vec3 p = surface.Point({(k % 30 + 0.5) / 30, (k / 30 + 0.5) / 30});
+    sum += std::pow(p.z() - 4 * std::sin(p.x() / 9) * std::cos(p.y() / 13), 2);
+  }
+  return std::sqrt(sum / 900);
+}
+
+// A second export moves each point a little. It must not make the noise look smaller.
+TEST(PointFit, ASecondExportCountsOnce) {
+  const PointTable once = Hills(1500, 100, 0.2, 3);
+  const PointFit alone = FitPoints(once, {}, {});
+  for (const double moved_mm : {1e-9, 1e-4, 1e-2}) {
+    SCOPED_TRACE(moved_mm);
+    PointTable twice = once;
+    Random random(5);
+    for (const Vec3& p : once.positions) {
+      twice.positions.push_back(p +
+                                moved_mm * Vec3(random.Normal(), random.Normal(), random.Normal()));
+    }
+    const PointFit fit = FitPoints(twice, {}, {});
+    EXPECT_NEAR(fit.fit.automatic->noise_mm, 0.2, 0.02);
+    EXPECT_NEAR(fit.fit.automatic->held_out_rms_mm, alone.fit.automatic->held_out_rms_mm, 0.03);
+    EXPECT_LT(ErrorOfHills(fit.fit.surface), 1.3 * ErrorOfHills(alone.fit.surface));
+    EXPECT_NEAR(fit.fit.automatic->near_copies, 1500, 30);
+    EXPECT_THAT(AutoText(*fit.fit.automatic), HasSubstr("as by a second export"));
+  }
+}
+
+// Two measurements at one place have errors of their own.
+TEST(PointFit, PointsThatWereMeasuredTwiceBothCount) {
+  PointTable twice = Hills(1000, 100, 0, 3);
+  const std::vector<Vec3> once = twice.positions;
+  twice.positions.insert(twice.positions.end(), once.begin(), once.end());
+  Random random(5);
+  for (Vec3& p : twice.positions) {
+    p.z() += 0.2 * random.Normal();
+  }
+  const PointFit fit = FitPoints(twice, {}, {});
+  EXPECT_LT(fit.fit.automatic->near_copies, 60);
+  EXPECT_NEAR(fit.fit.automatic->noise_mm, 0.2, 0.02);
+}
+
+TEST(PointFit, GivenUvMustBelongToThePoints) {
+  const PointTable hills = Hills(1500, 100, 0.1, 3);
+  const auto refusal = [&](const auto& uv_of, double sheets_mm) {
+    PointTable table = hills;
+    for (std::size_t k = 0; k < table.positions.size(); ++k) {
+      table.uv.push_back(uv_of(k));
+      table.positions[k].z() += k % 2 == 0 ? sheets_mm : 0;
+    }
+    return testing::WordsOf<InputError>([&] { FitPoints(std::move(table), {}, {}); });
+  };
+  const auto place = [&](std::size_t k) -> Vec2 { return hills.positions[k].head<2>() / 100; };
+  EXPECT_THAT(refusal([&](std::size_t k) { return place((k + 700) % 1500); }, 0),
+              HasSubstr("do not belong to the points"));
+  EXPECT_THAT(refusal([&](std::size_t) { return Vec2(0.5, 0.5); }, 0),
+              HasSubstr("the given (u,v) are all (0.5, 0.5)"));
+  EXPECT_THAT(refusal([&](std::size_t k) { return Vec2(place(k).x(), place(k).x()); }, 0),
+              HasSubstr("all on one line"));
+  EXPECT_THAT(refusal(place, 50), HasSubstr("several sheets of points to one place"));
+  EXPECT_THAT(refusal(place, 20), HasSubstr("several sheets of points to one place"));
+  PointTable good = hills;
+  for (std::size_t k = 0; k < good.positions.size(); ++k) {
+    good.uv.emplace_back(place(k).y(), place(k).x());  // swapped
+  }
+  EXPECT_NEAR(FitPoints(good, {}, {}).fit.automatic->noise_mm, 0.1, 0.01);
+}
+
+// A few points far off are left out and listed, whatever their coordinates.
+TEST(PointFit, StraysAreLeftOutAndListed) {
+  const PointTable hills = Hills(600, 60, 0.01, 3);
+  const PointFit clean = FitPoints(hills, {}, {});
+  for (const Vec3& stray : {Vec3(600, 600, 0), Vec3(600, 30, 0), Vec3(-9999, -9999, -9999),
+                            Vec3(30, 30, 1e30), Vec3(30, 30, -9999)}) {
+    SCOPED_TRACE(fmt::format("{} {} {}", stray.x(), stray.y(), stray.z()));
+    for (const int count : {1, 6}) {
+      PointTable table = hills;
+      table.positions.insert(table.positions.begin() + 100, count, stray);
+      const PointFit fit = FitPoints(table, {}, {});
+      EXPECT_THAT(fit.strays, ::testing::SizeIs(count));
+      EXPECT_EQ(fit.strays[0], 100u);
+      EXPECT_THAT(fit.fit.automatic->outliers, ::testing::IsSupersetOf(fit.strays));
+      EXPECT_NEAR(fit.fit.point_rms_mm, clean.fit.point_rms_mm, 1e-6);
+      EXPECT_FALSE(std::isfinite(fit.fit.residual_mm[100]));
+      EXPECT_EQ(fit.fit.residual_mm.back(), clean.fit.residual_mm.back());
+    }
+  }
+}
+
+// The files of people that gave wrong results without a word: the RMS that is right, and a note.
+TEST(PointFit, FilesOfTheFieldGiveTheRightResult) {
+  const std::filesystem::path folder = SEMBLANCE_SOURCE_DIR "/../shared/data/field";
+  if (!std::filesystem::exists(folder)) {
+    GTEST_SKIP() << "there is no folder " << folder;
+  }
+  struct Case {
+    const char* file;
+    double rms_mm;
+    const char* note;
+  };
+  for (const auto& [file, rms_mm, note] :
+       {Case{"stray-10-extents.csv", 0.01, "number 601"},
+        Case{"stray-zero-utm.csv", 0.01, "number 481"},
+        Case{"strip-1200x10.csv", 0.01, "104 x 1 patches"},
+        Case{"two-patches-1000.csv", 0.01, "lie in two places"},
+        Case{"degrees-and-metres.csv", 2, ""}, Case{"rgb.xyz", 0.01, "3 numbers after x, y and z"},
+        Case{"cloudcompare.txt", 0.01, "columns without effect: R, G, B"},
+        Case{"capitals.csv", 0.01, ""}, Case{"semicolons.csv", 0.01, ""},
+        Case{"nan-points.ply", 0.01, "60 points without finite coordinates left out"}}) {
+    SCOPED_TRACE(file);
+    const PointFit fit = FitPoints(ReadPointFile(folder / file).points, {}, {});
+    EXPECT_NEAR(fit.fit.point_rms_mm, rms_mm, 0.3 * rms_mm);
+    EXPECT_THAT(::testing::PrintToString(fit.notes), HasSubstr(note));
+    EXPECT_THAT(fit.Faults(), ::testing::IsEmpty());
+  }
+  const PointFit gross =
+      FitPoints(ReadPointFile(folder / "outliers-25-percent.csv").points, {}, {});
+  EXPECT_THAT(::testing::PrintToString(gross.notes), HasSubstr("the distances have a long tail"));
+  EXPECT_THAT(testing::WordsOf<InputError>(
+                  [&] { FitPoints(ReadPointFile(folder / "uv-all-the-same.csv").points, {}, {}); }),
+              HasSubstr("all (0.5, 0.5)"));
+  PointFitOptions upright;
+  upright.parameters = PlaneParameters{.normal = {0, 0, 1}};
+  const PointFit told =
+      FitPoints(ReadPointFile(folder / "degrees-and-metres.csv").points, upright, {});
+  EXPECT_NEAR(told.fit.point_rms_mm, 2, 0.6);
+  EXPECT_THAT(told.how, HasSubstr("coordinates in different units"));
+}
+
+// The same surface within the noise, for points in another order, mirrored, scaled or shifted.
+TEST(PointFit, LawsOfTheSamePoints) {
+  const PointTable table = Hills(800, 60, 0.05, 9);
+  const PointFit plain = FitPoints(table, {}, {});
+  const auto compare = [&](const auto& change, double scale) {
+    PointTable changed = table;
+    std::ranges::for_each(changed.positions, change);
+    const PointFit fit = FitPoints(changed, {}, {});
+    EXPECT_NEAR(fit.fit.automatic->noise_mm / scale, plain.fit.automatic->noise_mm, 0.005);
+    EXPECT_NEAR(fit.fit.point_rms_mm / scale, plain.fit.point_rms_mm, 0.005);
+  };
+  compare([](Vec3& p) { p.x() *= -1; }, 1);
+  compare([](Vec3& p) { std::swap(p.x(), p.y()); }, 1);
+  compare([](Vec3& p) { p *= 1e-3; }, 1e-3);
+  compare([](Vec3& p) { p *= 1e6; }, 1e6);
+  compare([](Vec3& p) { p += Vec3(1e6, -1e6, 1e6); }, 1);
+  PointTable reversed = table;
+  std::ranges::reverse(reversed.positions);
+  const PointFit back = FitPoints(reversed, {}, {});
+  EXPECT_NEAR(back.fit.residual_mm.front(), plain.fit.residual_mm.back(), 1e-6);
 }
 
 }  // namespace
