@@ -58,17 +58,42 @@ LastCrossing FindLastCrossing(const ScalarField& field, const SampleGrid& grid, 
   return last;
 }
 
+double ThinnestDepth_mm(std::span<const double> depth_mm) {
+  double thinnest = std::numeric_limits<double>::infinity();
+  for (const double depth : depth_mm) {
+    thinnest = std::isfinite(depth) ? std::min(thinnest, depth) : thinnest;
+  }
+  return thinnest;
+}
+
+// The longest side of the shell with its depth.
+double FaceExtent_mm(const TriMesh& shell, double depth_mm) {
+  return Bounds(shell).sizes().maxCoeff() + 2 * depth_mm;
+}
+
+// The field is positive only within about one depth of the shell, on both of its sides. Cells that
+// are larger than 3/4 of the thinnest depth miss this layer in places that depend on the grid's
+// pose, and the face gets holes there. So a coarser resolution is raised, but to the default at
+// most, because the cost grows with its square.
+int FineEnough(int resolution, double extent_mm, double thinnest_mm) {
+  constexpr double kCellOfThinnest = 0.75;
+  const int needed =
+      static_cast<int>(std::ceil(std::min(extent_mm / (kCellOfThinnest * thinnest_mm),
+                                          static_cast<double>(ImplicitFaceOptions().resolution))));
+  return std::max(resolution, needed);
+}
+
 // Makes a grid of cubic cells: `resolution` cells along the longest side of the shell plus its
-// largest depth, and a margin of `margin` times the depth on each side.
+// largest depth, and a margin of `margin` times the depth on each side. Shell and grid have the
+// same centre, so that a mirrored shell gets the mirrored grid.
 SampleGrid GridAround(const TriMesh& shell, double depth_mm, int resolution, double margin) {
   const Box3 box = Bounds(shell);
   SampleGrid grid;
-  grid.cell_mm = Vec3::Constant((box.sizes().maxCoeff() + 2 * depth_mm) / resolution);
-  grid.origin = box.min() - Vec3::Constant(margin * depth_mm) - 2 * grid.cell_mm;
+  grid.cell_mm = Vec3::Constant(FaceExtent_mm(shell, depth_mm) / resolution);
   for (int axis = 0; axis < 3; ++axis) {
-    grid.counts[axis] = static_cast<int>(std::ceil((box.sizes()[axis] + 2 * margin * depth_mm) /
-                                                   grid.cell_mm[axis])) +
-                        5;
+    const double side_mm = box.sizes()[axis] + 2 * margin * depth_mm;
+    grid.counts[axis] = static_cast<int>(std::ceil(side_mm / grid.cell_mm[axis])) + 5;
+    grid.origin[axis] = box.center()[axis] - 0.5 * (grid.counts[axis] - 1) * grid.cell_mm[axis];
   }
   return grid;
 }
@@ -99,29 +124,6 @@ bool FindStartCells(const TriMesh& shell, std::span<const double> depth_mm,
   return true;
 }
 
-// The surface point nearest to p along +-normal within reach_mm, or p if there is none.
-Vec3 MoveToSurface(const ImplicitSurface& surface, const Vec3& p, const Vec3& normal,
-                   double reach_mm) {
-  constexpr int kSteps = 8;
-  const EdgeSearchOptions search{.method = EdgeSearch::kRegulaFalsi, .tolerance = 1e-3};
-  double from = surface.Flattened(p);
-  const Vec3 step = (from > 0 ? 1 : -1) * reach_mm / kSteps * normal;
-  for (int n = 0; n < kSteps; ++n) {
-    const Vec3 start = p + n * step;
-    const double to = surface.Flattened(start + step);
-    if ((from > 0) != (to > 0)) {
-      std::int64_t evaluations = 0;
-      return start + SearchCrossing(
-                         from, to, search,
-                         [&](double t) { return surface.Flattened(start + t * step); },
-                         evaluations) *
-                         step;
-    }
-    from = to;
-  }
-  return p;
-}
-
 // Restores the corners of triangles that turned by a right angle or more, until no triangle has.
 void RestoreTurned(const TriMesh& before, TriMesh& mesh) {
   bool turned = true;
@@ -145,7 +147,8 @@ void ProjectOnto(const ImplicitSurface& surface, double reach_mm, const RunConte
   const TriMesh before = mesh;
   const std::vector<Vec3> normals = VertexNormals(before);
   ParallelFor(mesh.points.size(), context.threads, 64, [&](std::size_t v) {
-    mesh.points[v] = MoveToSurface(surface, before.points[v], normals[v], reach_mm);
+    const Vec3& p = before.points[v];
+    mesh.points[v] = FindOnLine(surface, p, normals[v], reach_mm).value_or(p);
   });
   RestoreTurned(before, mesh);
 }
@@ -155,8 +158,17 @@ void PolygonizeOutermost(const TriMesh& shell, std::span<const double> depth_mm,
                          const ImplicitSurface& surface, const ImplicitFaceOptions& options,
                          const RunContext& context, ImplicitFace& face) {
   const ScalarField field = [&surface](const Vec3& p) { return surface.Flattened(p); };
+  const double extent_mm = FaceExtent_mm(shell, surface.MaxDepth_mm());
+  const double thinnest_mm = ThinnestDepth_mm(depth_mm);
+  const int resolution = FineEnough(options.resolution, extent_mm, thinnest_mm);
+  if (resolution > options.resolution) {
+    face.notes.push_back(fmt::format(
+        "resolution: raised from {} to {}; cells of {:.2f} mm would lose parts of the thinnest "
+        "tissue, {:.2f} mm",
+        options.resolution, resolution, extent_mm / options.resolution, thinnest_mm));
+  }
   for (const double margin : {1.6, 3.0, 6.0, 12.0}) {
-    const SampleGrid grid = GridAround(shell, surface.MaxDepth_mm(), options.resolution, margin);
+    const SampleGrid grid = GridAround(shell, surface.MaxDepth_mm(), resolution, margin);
     std::vector<StartCell> starts;
     if (!FindStartCells(shell, depth_mm, field, grid, starts)) {
       continue;
@@ -201,14 +213,11 @@ void AppendNotes(const ImplicitFaceOptions& options, std::span<const double> dep
         "outward as the mesh gets denser (use 'flat' for the exact depth)",
         face.emitters_per_square_depth));
   }
-  double thinnest = std::numeric_limits<double>::infinity();
-  for (const double depth : depth_mm) {
-    thinnest = std::isfinite(depth) ? std::min(thinnest, depth) : thinnest;
-  }
-  if (face.cell_mm > thinnest) {
+  const double thinnest_mm = ThinnestDepth_mm(depth_mm);
+  if (face.cell_mm > thinnest_mm) {
     face.notes.push_back(
         fmt::format("resolution: cells of {:.2f} mm are larger than the thinnest tissue, {:.2f} mm",
-                    face.cell_mm, thinnest));
+                    face.cell_mm, thinnest_mm));
   }
 }
 
@@ -234,6 +243,25 @@ TriMesh KeepOutermost(const TriMesh& mesh, int& dropped) {
   }
   dropped = components.count - 1;
   return Submesh(mesh, keep);
+}
+
+std::optional<Vec3> FindOnLine(const ImplicitSurface& surface, const Vec3& start,
+                               const Vec3& direction, double reach_mm) {
+  constexpr int kSteps = 8;
+  const EdgeSearchOptions search{.method = EdgeSearch::kRegulaFalsi, .tolerance = 1e-3};
+  double from = surface.Flattened(start);
+  const Vec3 step = (from > 0 ? 1 : -1) * reach_mm / kSteps * direction;
+  for (int n = 0; n < kSteps; ++n) {
+    const Vec3 at = start + n * step;
+    const double to = surface.Flattened(at + step);
+    if ((from > 0) != (to > 0)) {
+      std::int64_t evaluations = 0;
+      const auto field = [&](double t) { return surface.Flattened(at + t * step); };
+      return at + SearchCrossing(from, to, search, field, evaluations) * step;
+    }
+    from = to;
+  }
+  return std::nullopt;
 }
 
 ImplicitFace BuildImplicitFace(const TriMesh& shell, std::span<const double> depth_mm,

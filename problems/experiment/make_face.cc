@@ -139,6 +139,20 @@ void Weigh(const FitTarget& dowels, const PriorKnowledge& known, std::vector<Fit
   WeighSeeds(tips, known.features, *known.trust, seeds);
 }
 
+// Moves seeds from the triangles of the implicit face onto the surface itself. Triangles cut its
+// curves short, by an amount that depends on the place of the grid's cells.
+void LayOnField(const HSplineSurface& surface, const SeedOptions& options,
+                const ImplicitSurface* field, std::vector<FitPoint>& seeds) {
+  constexpr double kReach_mm = 2;
+  if (field == nullptr) {
+    return;
+  }
+  for (FitPoint& seed : seeds) {
+    const Vec3 direction = surface.LevelFrame(options.direction_level, seed.uv).Normal();
+    seed.position = FindOnLine(*field, seed.position, direction, kReach_mm).value_or(seed.position);
+  }
+}
+
 // Fits the dowels first. Then each round takes seeds from the surface as it lies now and runs the
 // schedule with dowels and seeds (see seeding.h for the reason).
 FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInput& in,
@@ -153,6 +167,7 @@ FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInp
   for (int round = 0; round < plan.rounds; ++round) {
     context.Report("fit", fmt::format("round {} of {}", round + 1, plan.rounds));
     SeedResult seeding = SeedDowels(surface, query, in.implicit, masks, plan.seeds);
+    LayOnField(surface, plan.seeds, in.field, seeding.points);
     Weigh(dowels, known, seeding.points);
     FitTarget target = WithSeeds(dowels, seeding.points, plan.fit.terms, in.shell);
     target.shape = known.shape;

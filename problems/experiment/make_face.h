@@ -46,7 +46,8 @@ struct FaceInput {
   const Case& subject;
   const TriMesh& implicit;  // the seedable part; without triangles a prior uses the tips alone
   const TriMesh& shell;
-  bool tells_sigma = true;  // false: a prior's face gets no sigma, which saves time
+  const ImplicitSurface* field = nullptr;  // the surface of `implicit`, to lay seeds on it
+  bool tells_sigma = true;                 // false: a prior's face gets no sigma, which saves time
 };
 
 struct MadeFace {
