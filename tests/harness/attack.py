@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hostile calls of every command: what may come of them is known, and all else is a finding.
+"""Hostile calls of every command, and calls whose right result is known: all else is a finding.
 
-usage: attack.py PROGRAM CONFIGS [--cases N] [--seed N] [--only KIND] [--case ID] [--keep FOLDER] [--words FILE] [--good FOLDER]
+usage: attack.py PROGRAM CONFIGS [--cases N] [--laws N] [--seed N] [--only KIND] [--case ID] [--keep FOLDER] [--words FILE] [--good FOLDER]
 
 Cases are drawn from a seed: the same seed, the same cases. Each is called in a folder of its own, beside good files that
 it may name (seeds.py). A case is a finding where
@@ -14,6 +14,12 @@ it may name (seeds.py). A case is a finding where
     it was refused and something was written; or any file that it was given is changed
     it is done (0) and a JSON file that it wrote, or what it printed, holds NaN or infinity
     a control character reaches the terminal
+
+Laws (laws.py) are cases whose right result is known: an input in another form (turned, permuted, in RAS, in copies ...), or an
+everyday mistake. Such a case is also a finding where
+
+    a good input in another form is refused, or gives another result without a note
+    a mistake gives another result than the plain input, and no word of it
 
 Prints a table by kind, and each finding with what repeats it; ends with 1 if there is one. --case: one alone, with all that
 it says; --keep: its folder stays. --words: every different message, to be read by a person. --good: a
@@ -38,6 +44,7 @@ import threading
 import time
 
 import kinds
+import laws
 import seeds
 import server
 
@@ -207,13 +214,16 @@ class Attack:
         before = stamps(folder)
         got = call(self.program, case, folder)
         found = list(complaints(case, got, folder, before, stamps(folder)))
+        verdict, fault = laws.verdict(case, got, folder) if case.law else ("", "")
+        if fault:
+            found.append(fault)
         if stamps(self.root / "seeds") != self.known:
             found.append("a good file beside it is changed")
         for name, mode in case.modes.items():
             os.chmod(folder / name, 0o700)
         for ending in (".out", ".err"):
             (self.root / (folder.name + ending)).unlink()
-        return case, got, found, folder
+        return case, got, found, folder, verdict
 
     def remember(self, case, got):
         for line in plain_lines(got.err)[:3]:
@@ -221,9 +231,22 @@ class Attack:
             self.words.setdefault(shape, (case, line))
 
 
-def told(case, got, found):
+VERDICTS = ["right", "noted", "unusable", "refused", "silent"]
+
+
+def print_verdicts(verdicts, findings):
+    """Cases whose right result is known: accepted and right, accepted with a note, not usable, refused, wrong without a word."""
+    if not verdicts:
+        return
+    print(f"\n{'right result known':<22} {'cases':>6} " + " ".join(f"{v:>9}" for v in VERDICTS) + f" {'findings':>9} {'s per case':>11}")
+    for kind, row in verdicts.items():
+        count = sum(row[v] for v in VERDICTS)
+        print(f"{kind:<22} {count:6d} " + " ".join(f"{row[v]:9d}" for v in VERDICTS) + f" {findings.count(kind):9d} {row['cpu_s'] / count:11.2f}")
+
+
+def told(case, got, found, again):
     words = " ".join(map(repr, case.words))
-    return f"\n{case.kind} {case.id}: {case.what[:200]}\n  semblance {words[:600]}\n  code {got.code}, {got.cpu_s:.2f} s: {got.err.strip()[:600]}\n" + "".join(
+    return f"\n{case.kind} {case.id}: {case.what[:200]}\n  again: {again} --case {case.id}\n  semblance {words[:600]}\n  code {got.code}, {got.cpu_s:.2f} s: {got.err.strip()[:600]}\n" + "".join(
         f"  FINDING: {line}\n" for line in found)
 
 
@@ -232,6 +255,7 @@ def main():
     arguments.add_argument("program", type=pathlib.Path)
     arguments.add_argument("configs", type=pathlib.Path)
     arguments.add_argument("--cases", type=int, default=2000)
+    arguments.add_argument("--laws", type=int, default=1000)
     arguments.add_argument("--seed", type=int, default=1)
     arguments.add_argument("--jobs", type=int, default=1)
     arguments.add_argument("--only")
@@ -242,6 +266,7 @@ def main():
     given = arguments.parse_args()
     start = time.monotonic()
     program, configs = given.program.resolve(), given.configs.resolve()
+    again = f"{sys.argv[0]} {given.program} {given.configs} --cases {given.cases} --laws {given.laws} --seed {given.seed}"
     with tempfile.TemporaryDirectory(prefix="attack") as scratch:
         root = pathlib.Path(scratch)
         os.chmod(root, 0o755)
@@ -249,16 +274,23 @@ def main():
             shutil.copytree(given.good, root / "seeds", symlinks=True)
         else:
             (root / "seeds").mkdir()
-            seeds.make(program, configs, root / "seeds")
+            if given.cases:
+                seeds.make(program, configs, root / "seeds")
         if given.good and not given.good.exists():
             shutil.copytree(root / "seeds", given.good, symlinks=True)
-        attack = Attack(str(program), root)
-        cases = kinds.cases(str(program), root / "seeds", given.seed, given.cases)
+        world = laws.World(str(program), configs, root / "seeds", given.seed) if given.laws else None
+        cases = kinds.cases(str(program), root / "seeds", given.seed, given.cases) if given.cases else []
+        cases += laws.cases(world, given.laws) if world else []
         cases = [c for c in cases if given.only in (None, c.kind) and given.case in (None, c.id)]
+        attack = Attack(str(program), root)
         ready_s = time.monotonic() - start
-        table, findings = {}, []
+        table, findings, verdicts = {}, [], {}
         with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
-            for case, got, found, folder in pool.map(attack.run, cases, itertools.count()):
+            for case, got, found, folder, verdict in pool.map(attack.run, cases, itertools.count()):
+                if verdict:
+                    row = verdicts.setdefault(case.kind, {**dict.fromkeys(VERDICTS, 0), "cpu_s": 0.0})
+                    row[verdict] += 1
+                    row["cpu_s"] += got.cpu_s
                 row = table.setdefault(case.kind, [0, 0, 0, 0, 0, 0.0])
                 row[0] += 1
                 row[1 + min(3, got.code if got.code in (0, 1, 2) else 3)] += 1
@@ -266,13 +298,13 @@ def main():
                 attack.remember(case, got)
                 if found:
                     findings.append(case.kind)
-                    print(told(case, got, found), flush=True)
+                    print(told(case, got, found, again), flush=True)
                 if given.case:
                     print(got.out + got.err)
                 if given.case and given.keep:
                     shutil.copytree(folder, given.keep, symlinks=True)
                 shutil.rmtree(folder)
-        if given.case is None and given.only in (None, "workbench"):
+        if given.cases and given.case is None and given.only in (None, "workbench"):
             served, answers, faults = server.attack(str(program), root, given.seed)
             table["workbench"] = [served, *answers, 0.0]
             findings += ["workbench"] * len(faults)
@@ -283,6 +315,7 @@ def main():
         print(f"{kind:<22} {row[0]:6d} {row[1]:6d} {row[2]:9d} {row[3]:8d} {findings.count(kind):9d} {row[5]:12.1f}")
     total = [sum(row[k] for row in table.values()) for k in range(6)]
     print(f"{'all':<22} {total[0]:6d} {total[1]:6d} {total[2]:9d} {total[3]:8d} {len(findings):9d} {total[5]:12.1f}")
+    print_verdicts(verdicts, findings)
     print(f"seed {given.seed}; {time.monotonic() - start:.0f} s, of them {ready_s:.0f} s for the good files")
     if given.words:
         given.words.write_text("".join(f"{case.kind} {case.id} | {line}\n" for _, (case, line) in sorted(attack.words.items())))

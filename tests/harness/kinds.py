@@ -48,6 +48,7 @@ class Case:
     may_leave_on_refusal: bool = False
     may_print_anything: bool = False
     must_refuse: bool = False
+    law: object = None  # laws.Law: what a done case must give
 
     @property
     def id(self):
