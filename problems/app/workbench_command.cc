@@ -10,8 +10,10 @@
 #include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <memory>
 #include <stop_token>
 #include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -78,8 +80,26 @@ void OpenBrowser(const fs::path& folder, const std::string& url) {
   }
 }
 
+// Opens the workbench. If its source is refused, an unused folder stays as it was.
+std::unique_ptr<Bench> OpenBench(const BenchOptions& options) {
+  NewFolders made(options.folder);
+  const bool was_empty = fs::is_empty(options.folder);
+  try {
+    auto bench = std::make_unique<Bench>(options);
+    made.Keep();
+    return bench;
+  } catch (...) {
+    for (fs::directory_iterator at(options.folder), end; was_empty && at != end; ++at) {
+      std::error_code ignored;
+      fs::remove_all(at->path(), ignored);
+    }
+    throw;
+  }
+}
+
 int Workbench(const WorkbenchArguments& a) {
-  Bench bench(MakeBenchOptions(a));
+  const std::unique_ptr<Bench> opened = OpenBench(MakeBenchOptions(a));
+  Bench& bench = *opened;
   HttpServerOptions listening;
   listening.port = a.port;
   HttpServer server(bench, listening);

@@ -255,8 +255,9 @@ class StudyRunner {
   // Replaces the axes of an earlier plan in trial.json by those of this plan.
   void UpdateAxes(const StudyTrial& trial) const {
     Json stored = *ReadTrialFile(folder_, trial.id);
+    const Json head = TrialHead(plan_, trial);
     bool is_changed = false;
-    for (const auto& [key, value] : TrialHead(plan_, trial).items()) {
+    for (const auto& [key, value] : head.items()) {
       is_changed = is_changed || !stored.contains(key) || stored[key] != value;
       stored[key] = value;
     }
@@ -507,6 +508,7 @@ StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const Study
   SelectTrials(plan, options.only);
   NewFolders made(folder);
   OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
+  RefuseLinksBelow(folder, "trials");
   const StoredPlan stored = ReadStoredPlan(folder);
   const bool changed = IsChanged(stored, plan, folder);
   OpenDiskCache(options);  // the last of those that throw before anything is written

@@ -16,7 +16,7 @@ using ReportFile = std::function<void(const std::string& file)>;
 
 struct ChildRights {
   double memory_bytes = 0;                      // in addition to what this process uses now
-  std::vector<std::filesystem::path> readable;  // files, or folders with all that is in them
+  std::vector<std::filesystem::path> readable = {};  // files, or folders with all that is in them
 };
 
 // Returns what `work` returns. A forked copy of this process does the work; its terminal and all

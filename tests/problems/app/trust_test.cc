@@ -144,6 +144,58 @@ TEST_F(Trust, ARefusalLeavesNoFolder) {
 }
 
 // An incomplete CT would be read as a shorter one.
+TEST_F(Trust, EachCommandLeavesNothingAfterARefusal) {
+  Write("bad.ply", "no mesh");
+  Write("b.yaml",
+        "base: " + kPhantom + "\nsubject: {type: files, skull: bad.ply, landmarks: none.yaml}\n");
+  Write("study.yaml", "base: " + kPhantom + "\nset: {subject.rings: 16}\n");
+  Write("full/a.txt", "mine");
+  fs::create_directories(folder_ / "empty");
+  Call("status none");  // makes the files of its output
+  const auto names = [&] {
+    std::vector<fs::path> all;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_.Path())) {
+      all.push_back(entry.path());
+    }
+    std::ranges::sort(all);
+    return all;
+  };
+  const std::vector<fs::path> before = names();
+  for (const char* call :
+       {"run b.yaml --out out/a --quiet", "depth b.yaml --out out/a --quiet",
+        "study study.yaml --out out/a --cache bad.ply/c --quiet",
+        "study study.yaml --out bad.ply --cache out/c --quiet", "fit bad.ply --out out/a --quiet",
+        "import-ct bad.ply --out out/a", "import-ct empty --out out/a",
+        "template bad.ply --out out/a --quiet", "phantom --out out/a --volume x.docx",
+        "population empty --out out/a", "landmarks propose bad.ply --out out/a.yaml --quiet",
+        "landmarks page bad.ply --out out/a", "merge out/a full", "merge out/a", "report full",
+        "recentre b.yaml --out out/a", "workbench b.yaml --out out/a",
+        "workbench bad.ply --out out/a", "workbench bad.ply --out empty"}) {
+    const Outcome outcome = Call(call);
+    EXPECT_EQ(outcome.code, 2) << call << outcome.err;
+    EXPECT_EQ(names(), before) << call;
+  }
+}
+
+// Somebody else has put links into a shared folder.
+TEST_F(Trust, NoLinkInAFolderLeadsAFileElsewhere) {
+  Write("elsewhere/precious", "mine");
+  Write("study.yaml",
+        "base: " + kPhantom + "\nset: {subject.rings: 16, implicit.resolution: 20}\n");
+  fs::create_directories(folder_ / "s");
+  fs::create_directory_symlink(folder_ / "elsewhere", folder_ / "s/trials");
+  const Outcome study = Call("study study.yaml --out s --quiet");
+  EXPECT_EQ(study.code, 2);
+  EXPECT_THAT(study.err, HasSubstr("s/trials: it is a link"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "s"), {}), 1);
+  fs::create_directories(folder_ / "d");
+  fs::create_symlink(folder_ / "elsewhere/precious", folder_ / "d/depth.ply");
+  EXPECT_EQ(Call(kDepth + " --out d --force").code, 0);
+  EXPECT_FALSE(fs::is_symlink(folder_ / "d/depth.ply"));
+  EXPECT_EQ(ReadFileBytes(folder_ / "elsewhere/precious"), "mine");
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_ / "elsewhere"), {}), 1);
+}
+
 TEST_F(Trust, AKilledPhantomLeavesNoPartOfAHead) {
   const pid_t child = Start({"phantom", "--out", "out", "--pixel-mm", "2", "--slice-mm", "3"});
   WaitFor(folder_ / ".out.semblance-part");
