@@ -480,7 +480,7 @@ bool IsChanged(const StoredPlan& stored, const StudyPlan& plan, const fs::path& 
   if (changed && CountLeftOver(stored, plan) == static_cast<int>(stored.ids.size())) {
     throw IoError(fmt::format(
         "{}: the folder holds another study (plan {}, this is {}), and the two share no "
-        "trial; choose another --out",
+        "trial, because options or contents of input files differ; choose another --out",
         folder.string(), stored.hash, plan.hash));
   }
   return changed;
