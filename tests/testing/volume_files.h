@@ -19,6 +19,7 @@
 #include <cstring>
 #include <filesystem>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "problems/io/volumes/ct_volume.h"
@@ -67,6 +68,7 @@ struct SliceWords {
   std::string series = "1.2.3.1", number = "1", modality = "CT", description = "test";
   std::string compression = "";  // "JPEG" (lossless), "JPEG2000", "RLE"; empty: none
   double slope = 1, intercept = 0;
+  std::vector<std::pair<std::string, std::string>> more = {};  // tags, e.g. "0010|0020", and texts
 };
 
 // Slice k of the array as a file of its own.
@@ -87,6 +89,9 @@ inline void WriteDicomSlice(const std::filesystem::path& path, const VoxelArray&
   put("0020|0013", fmt::format("{}", k + 1));
   put("0028|1052", fmt::format("{}", words.intercept));
   put("0028|1053", fmt::format("{}", words.slope));
+  for (const auto& [tag, text] : words.more) {
+    put(tag.c_str(), text);
+  }
   io->KeepOriginalUIDOn();
   if (!words.compression.empty()) {
     io->UseCompressionOn();

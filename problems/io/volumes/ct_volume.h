@@ -3,9 +3,12 @@
 // conversion from the voxel order of a file and to coarser voxels.
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -74,6 +77,16 @@ struct VoxelArray {
   std::int64_t not_finite = 0;         // number of values that are not finite, set to the lowest
   std::vector<std::string> notes;      // assumptions about what the file leaves open, a line each
 };
+
+// Appends a value, rounded. One beyond int16, and one that is not finite, is counted.
+inline void AppendRounded(double value, VoxelArray& array) {
+  using Limits = std::numeric_limits<std::int16_t>;
+  const double rounded = std::isfinite(value) ? std::round(value) : Limits::min();
+  const double inside = std::clamp<double>(rounded, Limits::min(), Limits::max());
+  array.clipped += inside != rounded ? 1 : 0;
+  array.not_finite += std::isfinite(value) ? 0 : 1;
+  array.values.push_back(static_cast<std::int16_t>(inside));
+}
 
 // Returns the same voxels at the same places with the axes of CtVolume: axes are exchanged and
 // reversed as necessary. Throws InputError, naming `where`, like CheckVolume.

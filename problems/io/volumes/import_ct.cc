@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 
+#include "problems/io/volumes/head_check.h"
 #include "problems/io/volumes/head_mask.h"
 #include "problems/io/volumes/volume_surface.h"
 #include "problems/io/volumes/voxel_mask.h"
@@ -136,6 +137,7 @@ CtImport ImportVolume(const CtVolume& volume, const CtImportOptions& options,
   result.skin =
       SkinSurface(volume, mask, options.skin_hu, options.skin_hu + 1 + kInsideAboveSkin_hu, context,
                   result.dropped_skin);
+  CheckHeadExtent(volume, mask, result.skin, result.notes);
   if (options.edges == CtEdges::kHalfMaximum) {
     MoveEdges(volume, context, result);
   }
@@ -166,8 +168,12 @@ CtImport ImportCt(const CtVolume& volume, const CtImportOptions& options,
     throw InputError(fmt::format("import-ct: skin_hu {} is not below bone_hu {}", options.skin_hu,
                                  options.bone_hu));
   }
-  return IsFinerThan(volume, options.coarsen) ? ImportCoarser(volume, options, context)
-                                              : ImportVolume(volume, options, context);
+  std::vector<std::string> notes;
+  CheckHounsfieldUnits(volume, options.skin_hu, options.bone_hu, notes);
+  CtImport result = IsFinerThan(volume, options.coarsen) ? ImportCoarser(volume, options, context)
+                                                         : ImportVolume(volume, options, context);
+  result.notes.insert(result.notes.begin(), notes.begin(), notes.end());
+  return result;
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -247,6 +253,7 @@ MrSkin ImportMrSkin(const CtVolume& volume, const MrSkinOptions& options,
   result.skin = SkinSurface(volume, mask, result.skin_value, 2 * std::abs(result.skin_value) + 1,
                             context, result.dropped);
   CheckMeshSize(result.skin, "the skin");
+  CheckHeadExtent(volume, mask, result.skin, result.notes);
   result.notes.push_back(fmt::format("skin at the grey value {:.0f}{}", result.skin_value,
                                      options.skin_value > 0 ? "" : ", found by Otsu's method"));
   result.notes.push_back(

@@ -6,34 +6,57 @@
 
 #include <fmt/format.h>
 #include <gdcmImageWriter.h>
-#include <gdcmScanner.h>
+#include <gdcmMediaStorage.h>
+#include <gdcmPixmapReader.h>
+#include <gdcmSequenceOfItems.h>
 #include <gdcmTrace.h>
-#include <itkGDCMImageIO.h>
 #include <itkMetaImageIO.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
 
 #include <algorithm>
 #include <array>
+#include <clocale>
 #include <cmath>
-#include <cstdlib>
+#include <cstdint>
+#include <cstring>
 #include <fstream>
-#include <limits>
+#include <locale>
+#include <set>
 #include <sstream>
 
+#include "problems/io/volumes/dicom_series.h"
 #include "problems/io/volumes/volume_headers.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
 namespace {
 
-// Both libraries also print their errors to the terminal.
-void SilenceLibraries() {
-  itk::Object::SetGlobalWarningDisplay(false);
-  gdcm::Trace::DebugOff();
-  gdcm::Trace::WarningOff();
-  gdcm::Trace::ErrorOff();
-}
+// Both libraries print their errors to the terminal, and parse and write numbers as the locale has
+// them: in a locale with decimal commas they would read 2.5 as 2. An object of this class silences
+// them and keeps the locale "C" as long as it exists.
+class LibraryScope {
+ public:
+  LibraryScope() : before_(std::locale::global(std::locale::classic())) {
+    const char* const numeric = std::setlocale(LC_NUMERIC, nullptr);
+    numeric_before_ = numeric ? numeric : "C";
+    std::setlocale(LC_NUMERIC, "C");
+    itk::Object::SetGlobalWarningDisplay(false);
+    gdcm::Trace::DebugOff();
+    gdcm::Trace::WarningOff();
+    gdcm::Trace::ErrorOff();
+  }
+  ~LibraryScope() {
+    std::locale::global(before_);
+    std::setlocale(LC_NUMERIC, numeric_before_.c_str());
+  }
+  LibraryScope(const LibraryScope&) = delete;
+  LibraryScope& operator=(const LibraryScope&) = delete;
+
+ private:
+  std::locale before_;
+  std::string numeric_before_;
+};
 
 // The last sentence of ITK's message, without the address of an object in memory.
 std::string ErrorText(const itk::ExceptionObject& error) {
@@ -44,48 +67,44 @@ std::string ErrorText(const itk::ExceptionObject& error) {
   return words;
 }
 
+// Values that become slope * value + intercept.
+struct Rescale {
+  double slope = 1, intercept = 0;
+};
+
 template <class Value>
-void AppendRounded(const void* buffer, std::size_t count, VoxelArray& array) {
-  using Limits = std::numeric_limits<std::int16_t>;
+void AppendScaled(const void* buffer, std::size_t count, const Rescale& rescale,
+                  VoxelArray& array) {
   const Value* const values = static_cast<const Value*>(buffer);
   for (std::size_t n = 0; n < count; ++n) {
-    const auto value = static_cast<double>(values[n]);
-    if (std::isfinite(value)) {
-      const double rounded = std::round(value);
-      const double inside = std::clamp<double>(rounded, Limits::min(), Limits::max());
-      array.clipped += inside != rounded ? 1 : 0;
-      array.values.push_back(static_cast<std::int16_t>(inside));
-    } else {
-      ++array.not_finite;
-      array.values.push_back(Limits::min());
-    }
+    AppendRounded(rescale.slope * static_cast<double>(values[n]) + rescale.intercept, array);
   }
 }
 
-void AppendRounded(const itk::ImageIOBase& io, const void* buffer, std::size_t count,
-                   VoxelArray& array, const std::string& where) {
+void AppendScaled(const itk::ImageIOBase& io, const void* buffer, std::size_t count,
+                  const Rescale& rescale, VoxelArray& array, const std::string& where) {
   using Type = itk::IOComponentEnum;
   switch (io.GetComponentType()) {
     case Type::UCHAR:
-      return AppendRounded<unsigned char>(buffer, count, array);
+      return AppendScaled<unsigned char>(buffer, count, rescale, array);
     case Type::CHAR:
-      return AppendRounded<signed char>(buffer, count, array);
+      return AppendScaled<signed char>(buffer, count, rescale, array);
     case Type::USHORT:
-      return AppendRounded<unsigned short>(buffer, count, array);
+      return AppendScaled<unsigned short>(buffer, count, rescale, array);
     case Type::SHORT:
-      return AppendRounded<short>(buffer, count, array);
+      return AppendScaled<short>(buffer, count, rescale, array);
     case Type::UINT:
-      return AppendRounded<unsigned int>(buffer, count, array);
+      return AppendScaled<unsigned int>(buffer, count, rescale, array);
     case Type::INT:
-      return AppendRounded<int>(buffer, count, array);
+      return AppendScaled<int>(buffer, count, rescale, array);
     case Type::ULONG:
-      return AppendRounded<unsigned long>(buffer, count, array);
+      return AppendScaled<unsigned long>(buffer, count, rescale, array);
     case Type::LONG:
-      return AppendRounded<long>(buffer, count, array);
+      return AppendScaled<long>(buffer, count, rescale, array);
     case Type::FLOAT:
-      return AppendRounded<float>(buffer, count, array);
+      return AppendScaled<float>(buffer, count, rescale, array);
     case Type::DOUBLE:
-      return AppendRounded<double>(buffer, count, array);
+      return AppendScaled<double>(buffer, count, rescale, array);
     default:
       throw InputError(
           fmt::format("{}: voxels of type '{}' are not read", where,
@@ -94,8 +113,8 @@ void AppendRounded(const itk::ImageIOBase& io, const void* buffer, std::size_t c
 }
 
 // Appends all voxels of the file. Throws unless their number is as expected.
-void AppendVoxels(itk::ImageIOBase& io, std::size_t expected, VoxelArray& array,
-                  const std::string& where) {
+void AppendVoxels(itk::ImageIOBase& io, std::size_t expected, const Rescale& rescale,
+                  VoxelArray& array, const std::string& where) {
   if (io.GetNumberOfComponents() != 1) {
     throw InputError(fmt::format("{}: {} values per voxel (colours, vectors); one is needed", where,
                                  io.GetNumberOfComponents()));
@@ -120,7 +139,7 @@ void AppendVoxels(itk::ImageIOBase& io, std::size_t expected, VoxelArray& array,
   if (std::all_of(tail, buffer.end(), [](char byte) { return byte == kUntouched; })) {
     throw IoError(fmt::format("{}: the file is cut short; copy or export it again", where));
   }
-  AppendRounded(io, buffer.data(), count, array, where);
+  AppendScaled(io, buffer.data(), count, rescale, array, where);
 }
 
 struct Reader {
@@ -130,7 +149,7 @@ struct Reader {
 
 Reader MakeReader(VolumeFormat format) {
   switch (format) {
-    case VolumeFormat::kNifti:
+    case VolumeFormat::kNifti:  // is written only
       return {itk::NiftiImageIO::New().GetPointer(), "NIfTI"};
     case VolumeFormat::kNrrd:
       return {itk::NrrdImageIO::New().GetPointer(), "NRRD"};
@@ -187,27 +206,12 @@ std::string ReadHead(const std::filesystem::path& file, std::uintmax_t max_bytes
   return head;
 }
 
-// MetaImage's library loops over as many axes as the header claims, without a limit.
-void CheckMetaImageAxes(const std::filesystem::path& file) {
-  const std::string head = ReadHead(file);
-  const std::size_t line = head.find("NDims"), sign = head.find('=', line);
-  if (line == head.npos || sign == head.npos) {
-    return;  // the library reports what is missing
-  }
-  const int axes = std::atoi(head.substr(sign + 1, 16).c_str());
-  constexpr int kMaxAxes = 10;  // the limit of the library
-  if (axes < 1 || axes > kMaxAxes) {
-    throw InputError(
-        fmt::format("{}: NDims is not a number of axes; a volume has 3", file.string()));
-  }
-}
-
-// The libraries of NIfTI and MetaImage do not report a file that ends too early; that of NRRD does.
-// The size of a MetaImage shows it if the MetaImage is one file and not compressed.
+// The library of MetaImage does not report a file that ends too early; that of NRRD does. The size
+// shows it if the MetaImage is one file and not compressed.
 void CheckMetaImageWhole(const std::filesystem::path& file, std::uintmax_t needed) {
   const std::string head = ReadHead(file);
   const std::size_t local = head.find("LOCAL");
-  if (local == head.npos || head.find("CompressedData = True") != head.npos) {
+  if (local == head.npos || IsCompressedMetaImage(head)) {
     return;
   }
   if (std::filesystem::file_size(file) < needed + head.find('\n', local) + 1) {
@@ -217,134 +221,395 @@ void CheckMetaImageWhole(const std::filesystem::path& file, std::uintmax_t neede
   }
 }
 
-// Refuses files that end the libraries or keep them busy forever. ITK's decomposition of a NIfTI
-// matrix does not end if the matrix holds a huge number or one that is not finite.
-void CheckForLibrary(const std::filesystem::path& file, VolumeFormat format) {
-  if (format == VolumeFormat::kMetaImage) {
-    CheckMetaImageAxes(file);
-  } else if (format == VolumeFormat::kNifti) {
-    CheckNiftiPlace(file);
-  }
-}
-
-// ITK's size of a NIfTI does not serve here: ITK converts voxels with a slope to floats.
-void CheckWhole(const std::filesystem::path& file, VolumeFormat format,
-                const itk::ImageIOBase& io) {
-  if (format == VolumeFormat::kMetaImage) {
-    CheckMetaImageWhole(file, static_cast<std::uintmax_t>(io.GetImageSizeInBytes()));
-  } else if (format == VolumeFormat::kNifti) {
-    CheckNiftiWhole(file, static_cast<double>(io.GetImageSizeInPixels()));
-  }
-}
-
-HeaderPlace ReadNiftiPlace(const std::filesystem::path& file) {
-  HeaderPlace place;
-  if (!NiftiHasPlace(file)) {
-    place.notes.emplace_back(
-        "the file does not state its orientation (its qform_code and sform_code are 0); taken as "
-        "LPS");
-  }
-  return place;
-}
-
-HeaderPlace ReadPlace(const std::filesystem::path& file, VolumeFormat format) {
-  constexpr std::uintmax_t kMaxHeader_bytes = 1 << 20;
-  switch (format) {
-    case VolumeFormat::kNifti:
-      return ReadNiftiPlace(file);
-    case VolumeFormat::kNrrd:
-      return ParseNrrdPlace(ReadHead(file, kMaxHeader_bytes), file.string());
-    default:
-      return ParseMetaImagePlace(ReadHead(file, kMaxHeader_bytes));
-  }
-}
-
 std::size_t VoxelCount(const VoxelArray& array) {
   return static_cast<std::size_t>(array.counts[0]) * array.counts[1] * array.counts[2];
 }
 
 namespace tags {
+const gdcm::Tag kCharacters(0x0008, 0x0005);
 const gdcm::Tag kImageType(0x0008, 0x0008), kSopClass(0x0008, 0x0016), kSopInstance(0x0008, 0x0018);
 const gdcm::Tag kStudyDate(0x0008, 0x0020), kStudyTime(0x0008, 0x0030);
 const gdcm::Tag kModality(0x0008, 0x0060), kDescription(0x0008, 0x103e), kPatient(0x0010, 0x0010);
-const gdcm::Tag kPatientId(0x0010, 0x0020), kThickness(0x0018, 0x0050);
-const gdcm::Tag kPatientPosition(0x0018, 0x5100), kStudy(0x0020, 0x000d), kSeries(0x0020, 0x000e);
-const gdcm::Tag kSeriesNumber(0x0020, 0x0011), kInstance(0x0020, 0x0013);
+const gdcm::Tag kPatientId(0x0010, 0x0020), kBirthDate(0x0010, 0x0030), kThickness(0x0018, 0x0050);
+const gdcm::Tag kTilt(0x0018, 0x1120), kPatientPosition(0x0018, 0x5100), kStudy(0x0020, 0x000d);
+const gdcm::Tag kSeries(0x0020, 0x000e), kSeriesNumber(0x0020, 0x0011), kInstance(0x0020, 0x0013);
 const gdcm::Tag kPosition(0x0020, 0x0032), kOrientation(0x0020, 0x0037), kFrame(0x0020, 0x0052);
-const gdcm::Tag kFrames(0x0028, 0x0008), kRows(0x0028, 0x0010), kColumns(0x0028, 0x0011);
-const gdcm::Tag kSpacing(0x0028, 0x0030), kPixels(0x7fe0, 0x0010);
+const gdcm::Tag kSamples(0x0028, 0x0002), kFrames(0x0028, 0x0008), kRows(0x0028, 0x0010);
+const gdcm::Tag kColumns(0x0028, 0x0011), kSpacing(0x0028, 0x0030), kBits(0x0028, 0x0100);
+const gdcm::Tag kIntercept(0x0028, 0x1052), kSlope(0x0028, 0x1053), kValueTable(0x0028, 0x3000);
+const gdcm::Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
+const gdcm::Tag kPixels(0x7fe0, 0x0010);
+// The groups of an enhanced image that hold these tags.
+const gdcm::Tag kPlacePosition(0x0020, 0x9113), kPlaceOrientation(0x0020, 0x9116);
+const gdcm::Tag kMeasures(0x0028, 0x9110), kTransformation(0x0028, 0x9145);
 }  // namespace tags
 
-std::string Text(const gdcm::Scanner& scanner, const std::string& file, const gdcm::Tag& tag) {
-  const char* const value = scanner.GetValue(file.c_str(), tag);
-  std::string text = value ? value : "";
-  text.erase(0, std::min(text.size(), text.find_first_not_of(' ')));
-  text.erase(text.find_last_not_of(' ') + 1);
-  return text;
-}
-
-// The numbers of a tag, separated by backslashes; empty unless their number is as expected.
-std::vector<double> Numbers(const std::string& text, std::size_t expected) {
-  std::vector<double> numbers;
-  std::istringstream parts(text);
-  for (std::string part; std::getline(parts, part, '\\');) {
-    char* end = nullptr;
-    numbers.push_back(std::strtod(part.c_str(), &end));
-    if (end == part.c_str()) {
-      return {};
-    }
+std::string Text(const gdcm::DataSet& data, const gdcm::Tag& tag) {
+  const gdcm::ByteValue* const value =
+      data.FindDataElement(tag) ? data.GetDataElement(tag).GetByteValue() : nullptr;
+  constexpr std::string_view kPadding(" \0", 2);
+  std::string_view text;
+  if (value) {
+    text = {value->GetPointer(), static_cast<std::size_t>(value->GetLength())};
   }
-  return numbers.size() == expected ? numbers : std::vector<double>();
+  text.remove_prefix(std::min(text.size(), text.find_first_not_of(kPadding)));
+  return std::string(text.substr(0, text.find_last_not_of(kPadding) + 1));
 }
 
-int Count(const std::string& text, int otherwise) {
-  const std::vector<double> number = Numbers(text, 1);
-  constexpr double kMaxCount = 1e9;  // larger numbers do not fit an int
-  return number.empty() || !(std::abs(number[0]) <= kMaxCount) ? otherwise
-                                                               : static_cast<int>(number[0]);
+int UnsignedShort(const gdcm::DataSet& data, const gdcm::Tag& tag, int otherwise) {
+  const gdcm::ByteValue* const value =
+      data.FindDataElement(tag) ? data.GetDataElement(tag).GetByteValue() : nullptr;
+  std::uint16_t number = 0;
+  if (!value || !value->GetBuffer(reinterpret_cast<char*>(&number), sizeof number)) {
+    return otherwise;
+  }
+  return number;
 }
 
-DicomHeader MakeHeader(const gdcm::Scanner& scanner, const std::string& file) {
-  const auto text = [&](const gdcm::Tag& tag) { return Text(scanner, file, tag); };
-  DicomHeader header{.file = file,
-                     .series_uid = text(tags::kSeries),
-                     .series_number = text(tags::kSeriesNumber),
-                     .description = text(tags::kDescription),
-                     .modality = text(tags::kModality),
-                     .image_type = text(tags::kImageType),
-                     .rows = Count(text(tags::kRows), -1),
-                     .columns = Count(text(tags::kColumns), -1),
-                     .frames = Count(text(tags::kFrames), 1),
-                     .position = {},
-                     .along_columns = {},
-                     .along_rows = {},
-                     .spacing_mm = {}};
-  const std::vector<double> p = Numbers(text(tags::kPosition), 3);
-  const std::vector<double> o = Numbers(text(tags::kOrientation), 6);
-  const std::vector<double> s = Numbers(text(tags::kSpacing), 2);
+int Integer(const std::string& text, int otherwise) {
+  constexpr double kMaxInteger = 1e9;  // larger numbers do not fit an int
+  const std::vector<double> number = ParseDecimals(text).numbers;
+  return number.size() != 1 || !(std::abs(number[0]) <= kMaxInteger) ? otherwise
+                                                                     : static_cast<int>(number[0]);
+}
+
+// The tags of one image of a file. An enhanced file keeps them in groups of each image, or in
+// groups that all images share; other files keep them in the data set itself.
+class ImageTags {
+ public:
+  explicit ImageTags(const gdcm::DataSet& data)
+      : data_(&data),
+        shared_(Sequence(data, tags::kSharedGroups)),
+        frames_(Sequence(data, tags::kFrameGroups)) {}
+
+  int PlacedFrames() const { return frames_ ? static_cast<int>(frames_->GetNumberOfItems()) : 0; }
+  std::string Find(int frame, const gdcm::Tag& group, const gdcm::Tag& tag) const {
+    for (const auto& [sequence, item] : {std::pair(frames_, frame), std::pair(shared_, 0)}) {
+      const std::string text = InGroup(sequence, item, group, tag);
+      if (!text.empty()) {
+        return text;
+      }
+    }
+    return Text(*data_, tag);
+  }
+
+ private:
+  using Items = gdcm::SmartPointer<gdcm::SequenceOfItems>;
+  static Items Sequence(const gdcm::DataSet& data, const gdcm::Tag& tag) {
+    return data.FindDataElement(tag) ? data.GetDataElement(tag).GetValueAsSQ() : Items();
+  }
+  static std::string InGroup(const Items& sequence, int item, const gdcm::Tag& group,
+                             const gdcm::Tag& tag) {
+    const auto has = [](const Items& items, int index) {
+      return items && static_cast<int>(items->GetNumberOfItems()) > index;
+    };
+    if (!has(sequence, item)) {
+      return "";
+    }
+    const Items members = Sequence(sequence->GetItem(item + 1).GetNestedDataSet(), group);
+    return has(members, 0) ? Text(members->GetItem(1).GetNestedDataSet(), tag) : "";
+  }
+
+  const gdcm::DataSet* data_;
+  Items shared_, frames_;
+};
+
+// The numbers of a tag. Sets the header's fault if they are no numbers, or not as many as expected.
+std::vector<double> Numbers(const std::string& name, const std::string& text, std::size_t expected,
+                            DicomHeader& header) {
+  if (text.empty()) {
+    return {};
+  }
+  const Decimals decimals = ParseDecimals(text);
+  if (decimals.numbers.size() != expected) {
+    AddWords(fmt::format("{} is '{}', which is not {}", name, CleanDicomText(text),
+                         expected == 1 ? "a number" : fmt::format("{} numbers", expected)),
+             header.fault);
+    return {};
+  }
+  if (decimals.has_comma && header.comma.empty()) {
+    header.comma = fmt::format("{} '{}'", name, CleanDicomText(text));
+  }
+  return decimals.numbers;
+}
+
+double Number(const std::string& name, const std::string& text, DicomHeader& header) {
+  const std::vector<double> number = Numbers(name, text, 1, header);
+  return number.empty() ? kNaN : number[0];
+}
+
+void SetPlace(const ImageTags& image, DicomHeader& header) {
+  const std::string position = image.Find(header.frame, tags::kPlacePosition, tags::kPosition);
+  const std::string orientation =
+      image.Find(header.frame, tags::kPlaceOrientation, tags::kOrientation);
+  const std::string spacing = image.Find(header.frame, tags::kMeasures, tags::kSpacing);
+  const auto p = Numbers(kPositionTag, position, 3, header);
+  const auto o = Numbers(kOrientationTag, orientation, 6, header);
+  const auto s = Numbers(kSpacingTag, spacing, 2, header);
   if (!p.empty()) {
     header.position = Vec3(p[0], p[1], p[2]);
   }
   if (!o.empty()) {
-    header.along_columns = Vec3(o[0], o[1], o[2]).normalized();
-    header.along_rows = Vec3(o[3], o[4], o[5]).normalized();
+    header.along_columns = Vec3(o[0], o[1], o[2]);
+    header.along_rows = Vec3(o[3], o[4], o[5]);
   }
   if (!s.empty()) {
     header.spacing_mm = Vec2(s[1], s[0]);  // the tag has the spacing between rows first
   }
+  for (const auto& [name, text] :
+       {std::pair(kPositionTag, position), std::pair(kOrientationTag, orientation),
+        std::pair(kSpacingTag, spacing)}) {
+    if (text.empty()) {
+      AddWords(name, header.lacking);
+    }
+  }
+  CheckSlicePlace(header);
+}
+
+void SetValues(const gdcm::DataSet& data, const ImageTags& image, DicomHeader& header) {
+  header.slope =
+      Number(kSlopeTag, image.Find(header.frame, tags::kTransformation, tags::kSlope), header);
+  header.intercept = Number(
+      kInterceptTag, image.Find(header.frame, tags::kTransformation, tags::kIntercept), header);
+  header.thickness_mm = Number("Slice Thickness (0018,0050)",
+                               image.Find(header.frame, tags::kMeasures, tags::kThickness), header);
+  header.tilt_deg = Number("Gantry/Detector Tilt (0018,1120)", Text(data, tags::kTilt), header);
+  if (data.FindDataElement(tags::kValueTable)) {
+    AddWords("its values are in a Modality LUT Sequence (0028,3000), which is not read",
+             header.fault);
+  }
+}
+
+// The tags that all images of a file share.
+DicomHeader MakeHeader(const std::filesystem::path& file, const gdcm::DataSet& data) {
+  const auto text = [&](const gdcm::Tag& tag) { return Text(data, tag); };
+  DicomHeader header;
+  header.file = file;
+  header.characters = text(tags::kCharacters);
+  header.series_uid = text(tags::kSeries);
+  header.series_number = text(tags::kSeriesNumber);
+  header.description = text(tags::kDescription);
+  header.modality = text(tags::kModality);
+  header.image_type = text(tags::kImageType);
+  header.patient_id = text(tags::kPatientId);
+  header.patient_name = text(tags::kPatient);
+  header.birth_date = text(tags::kBirthDate);
+  header.space_uid = text(tags::kFrame);
+  header.instance = Integer(text(tags::kInstance), -1);
+  header.rows = UnsignedShort(data, tags::kRows, -1);
+  header.columns = UnsignedShort(data, tags::kColumns, -1);
+  header.frames = std::max(1, Integer(text(tags::kFrames), 1));
   return header;
 }
 
-// True for a file with "DICM" after 128 bytes that is not the table of contents of a disc. GDCM
-// would scan other files too, and some of them end the program.
+// ---------------------------------------------------------------------------------------------
+// The bytes of pixels. GDCM fills those that a file lacks with 0, which is soft tissue.
+// ---------------------------------------------------------------------------------------------
+
+std::uint32_t LittleEndian(std::string_view bytes, std::size_t at) {
+  std::uint32_t value = 0;
+  for (std::size_t k = 0; k < sizeof value; ++k) {
+    value |= std::uint32_t{static_cast<unsigned char>(bytes[at + k])} << (8 * k);
+  }
+  return value;
+}
+
+std::string ReadBytes(std::istream& in, std::streamoff from, std::size_t count) {
+  std::string bytes(count, '\0');
+  in.clear();
+  in.seekg(from);
+  in.read(bytes.data(), static_cast<std::streamsize>(count));
+  bytes.resize(static_cast<std::size_t>(in.gcount()));
+  return bytes;
+}
+
+// True if the stream stands behind the tag and the length of the pixels. Sets their length.
+bool IsAtPixels(std::istream& in, std::streamoff at, std::uint32_t& length) {
+  constexpr std::size_t kHead_bytes = 12;  // the longest form of an element's tag and length
+  const std::string head =
+      ReadBytes(in, at - static_cast<std::streamoff>(kHead_bytes), kHead_bytes);
+  if (head.size() < kHead_bytes) {
+    return false;
+  }
+  constexpr std::string_view kLittle("\xe0\x7f\x10\x00", 4), kBig("\x7f\xe0\x00\x10", 4);
+  length = LittleEndian(head, 8);
+  if (head.starts_with(kBig)) {
+    length = __builtin_bswap32(length);
+  }
+  return head.starts_with(kLittle) || head.starts_with(kBig) || head.substr(4, 4) == kLittle;
+}
+
+constexpr std::uint32_t kUnknownLength = 0xffffffff;
+
+// A fault of compressed pixels: they are items, each with its length, and end with a mark.
+std::string FaultOfItems(std::istream& in, std::streamoff at, std::streamoff end) {
+  constexpr std::uint32_t kItem = 0xe000fffe, kEnd = 0xe0ddfffe;
+  while (at + 8 <= end) {
+    const std::string head = ReadBytes(in, at, 8);
+    if (LittleEndian(head, 0) == kEnd) {
+      return "";
+    }
+    if (LittleEndian(head, 0) != kItem) {
+      return "its compressed pixels are damaged";
+    }
+    at += 8 + static_cast<std::streamoff>(LittleEndian(head, 4));
+  }
+  return "it ends within its compressed pixels";
+}
+
+// The bytes that uncompressed pixels need.
+double PixelBytes(const gdcm::DataSet& data, const DicomHeader& header) {
+  return std::ceil(static_cast<double>(header.rows) * header.columns * header.frames *
+                   UnsignedShort(data, tags::kSamples, 1) * UnsignedShort(data, tags::kBits, 16) /
+                   8);
+}
+
+std::string FaultOfPixels(std::istream& in, std::streamoff at, std::uint32_t length,
+                          double needed) {
+  in.clear();
+  in.seekg(0, std::ios::end);
+  const std::streamoff end = in.tellg();
+  if (length == kUnknownLength) {
+    return FaultOfItems(in, at, end);
+  }
+  const double present = std::min<double>(length, static_cast<double>(end - at));
+  if (present < std::max<double>(length, needed)) {
+    return fmt::format("it holds {:.0f} of the {:.0f} bytes of its pixels", present,
+                       std::max<double>(length, needed));
+  }
+  return "";
+}
+
+// True for a stored file without its first 132 bytes (the last four are "DICM"): it begins with
+// elements of group 2 or 8 in ascending order.
+bool IsBareDataSet(std::string_view head) {
+  constexpr std::size_t kElements = 2;
+  std::size_t at = 0;
+  std::uint32_t before = 0;
+  for (std::size_t n = 0; n < kElements; ++n) {
+    if (at + 8 > head.size()) {
+      return false;
+    }
+    const std::uint32_t stored = LittleEndian(head, at), tag = (stored << 16) | (stored >> 16);
+    const std::uint32_t group = tag >> 16;
+    const bool has_type = std::isupper(static_cast<unsigned char>(head[at + 4])) != 0 &&
+                          std::isupper(static_cast<unsigned char>(head[at + 5])) != 0;
+    const std::uint32_t length =
+        has_type ? LittleEndian(head, at + 4) >> 16 : LittleEndian(head, at + 4);
+    if ((group != 2 && group != 8) || tag < before || length > head.size()) {
+      return false;
+    }
+    before = tag + 1;
+    at += 8 + length;
+  }
+  return true;
+}
+
+// True for a file that begins like DICOM and is not the table of contents of a disc. GDCM would
+// scan other files too, and some of them end the program.
 bool CanBeSlice(const std::filesystem::path& file) {
   if (file.filename().string().starts_with("DICOMDIR")) {
     return false;
   }
-  std::array<char, 132> head = {};
-  std::ifstream in(file, std::ios::binary);
-  in.read(head.data(), head.size());
-  return in && std::string_view(head.data() + 128, 4) == "DICM";
+  const std::string head = ReadHead(file);
+  return (head.size() >= 132 && std::string_view(head).substr(128, 4) == "DICM") ||
+         IsBareDataSet(head);
+}
+
+// Reads the tags before the pixels. Returns false if they are damaged.
+bool ReadTags(std::istream& in, gdcm::Reader& reader) try {
+  reader.SetStream(in);
+  return reader.ReadUpToTag(tags::kPixels, {tags::kPixels});
+} catch (const std::exception&) {
+  return false;
+}
+
+bool IsKnownWithoutPixels(const gdcm::File& file) {
+  gdcm::MediaStorage kind;
+  kind.SetFromFile(file);
+  return !kind.IsUndefined() && !gdcm::MediaStorage::IsImage(kind);
+}
+
+// One header per image of the file that has a place, or one for the file.
+std::vector<DicomHeader> MakeHeaders(DicomHeader header, const gdcm::DataSet& data) {
+  const ImageTags image(data);
+  if (header.frames > 1 && image.PlacedFrames() != header.frames) {
+    header.lacking = fmt::format(
+        "a Per-frame Functional Groups Sequence (5200,9230) that places each of their images");
+    return {header};
+  }
+  std::vector<DicomHeader> headers;
+  for (int frame = 0; frame < header.frames; ++frame) {
+    DicomHeader& one = headers.emplace_back(header);
+    one.frame = frame;
+    SetPlace(image, one);
+    SetValues(data, image, one);
+  }
+  return headers;
+}
+
+// ---------------------------------------------------------------------------------------------
+// The pixels of a DICOM file
+// ---------------------------------------------------------------------------------------------
+
+struct DicomPixels {
+  std::filesystem::path file;
+  gdcm::PixelFormat format;
+  std::vector<char> bytes;
+  std::size_t image_bytes = 0;
+};
+
+DicomPixels ReadPixels(const DicomHeader& header) {
+  const std::string where = header.file.string();
+  gdcm::PixmapReader reader;
+  reader.SetFileName(where.c_str());
+  if (!reader.Read()) {
+    throw IoError(fmt::format("{}: its pixels cannot be read; copy or export it again", where));
+  }
+  const gdcm::Pixmap& image = reader.GetPixmap();
+  DicomPixels pixels{.file = header.file, .format = image.GetPixelFormat(), .bytes = {}};
+  if (pixels.format.GetSamplesPerPixel() != 1 ||
+      image.GetPhotometricInterpretation() == gdcm::PhotometricInterpretation::PALETTE_COLOR) {
+    throw InputError(fmt::format("{}: its pixels are colours; grey values are needed", where));
+  }
+  pixels.image_bytes =
+      static_cast<std::size_t>(header.rows) * header.columns * pixels.format.GetPixelSize();
+  pixels.bytes.resize(image.GetBufferLength());
+  if (pixels.bytes.size() != pixels.image_bytes * header.frames ||
+      !image.GetBuffer(pixels.bytes.data())) {
+    throw IoError(fmt::format(
+        "{}: its pixels are damaged, or compressed in a way that is not read; copy or export it "
+        "again, uncompressed",
+        where));
+  }
+  return pixels;
+}
+
+void AppendImage(const DicomPixels& pixels, const DicomHeader& header, VoxelArray& array) {
+  const char* const from = pixels.bytes.data() + pixels.image_bytes * header.frame;
+  const std::size_t count = static_cast<std::size_t>(header.rows) * header.columns;
+  const Rescale rescale{.slope = std::isnan(header.slope) ? 1 : header.slope,
+                        .intercept = std::isnan(header.intercept) ? 0 : header.intercept};
+  using gdcm::PixelFormat;
+  switch (pixels.format.GetScalarType()) {
+    case PixelFormat::UINT8:
+      return AppendScaled<std::uint8_t>(from, count, rescale, array);
+    case PixelFormat::INT8:
+      return AppendScaled<std::int8_t>(from, count, rescale, array);
+    case PixelFormat::UINT12:
+    case PixelFormat::UINT16:
+      return AppendScaled<std::uint16_t>(from, count, rescale, array);
+    case PixelFormat::INT12:
+    case PixelFormat::INT16:
+      return AppendScaled<std::int16_t>(from, count, rescale, array);
+    case PixelFormat::UINT32:
+      return AppendScaled<std::uint32_t>(from, count, rescale, array);
+    case PixelFormat::INT32:
+      return AppendScaled<std::int32_t>(from, count, rescale, array);
+    default:
+      throw InputError(fmt::format("{}: pixels of type {} are not read", header.file.string(),
+                                   pixels.format.GetScalarTypeAsString()));
+  }
 }
 
 void PutTag(gdcm::DataSet& data, const gdcm::Tag& tag, const gdcm::VR& vr, std::string text) {
@@ -404,23 +669,27 @@ void PutVoxels(const CtVolume& volume, int slice, gdcm::Image& image) {
 }  // namespace
 
 VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat format) {
-  SilenceLibraries();
+  const LibraryScope scope;
   const std::string where = file.string();
   const Reader reader = MakeReader(format);
-  CheckForLibrary(file, format);
+  constexpr std::uintmax_t kMaxHeader_bytes = 1 << 20;
+  const std::string head = ReadHead(file, kMaxHeader_bytes);
+  const HeaderPlace place = format == VolumeFormat::kNrrd ? ParseNrrdPlace(head, where)
+                                                          : ParseMetaImagePlace(head, where);
   try {
     if (!reader.io->CanReadFile(where.c_str())) {
       throw IoError(
           fmt::format("{}: it is not a {} file, or its header is damaged", where, reader.name));
     }
-    const HeaderPlace place = ReadPlace(file, format);
     reader.io->SetFileName(where);
     reader.io->ReadImageInformation();
     VoxelArray array = ReadGeometry(*reader.io, file);
-    CheckWhole(file, format, *reader.io);
+    if (format == VolumeFormat::kMetaImage) {
+      CheckMetaImageWhole(file, static_cast<std::uintmax_t>(reader.io->GetImageSizeInBytes()));
+    }
     ApplyPlace(place, array);
     array.values.reserve(VoxelCount(array));
-    AppendVoxels(*reader.io, VoxelCount(array), array, where);
+    AppendVoxels(*reader.io, VoxelCount(array), {place.slope, place.intercept}, array, where);
     return array;
   } catch (const itk::ExceptionObject& error) {
     throw IoError(
@@ -428,45 +697,49 @@ VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat forma
   }
 }
 
-std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& files) {
-  SilenceLibraries();
-  gdcm::Scanner scanner;
-  for (const gdcm::Tag& tag : {tags::kImageType, tags::kModality, tags::kDescription, tags::kSeries,
-                               tags::kSeriesNumber, tags::kPosition, tags::kOrientation,
-                               tags::kFrames, tags::kRows, tags::kColumns, tags::kSpacing}) {
-    scanner.AddTag(tag);
+std::vector<DicomHeader> ScanDicom(const std::filesystem::path& file) {
+  if (!CanBeSlice(file)) {
+    return {};
   }
-  gdcm::Directory::FilenamesType names;
-  for (const std::filesystem::path& file : files) {
-    if (CanBeSlice(file)) {
-      names.push_back(file.string());
-    }
+  const LibraryScope scope;
+  std::ifstream in(file, std::ios::binary);
+  gdcm::Reader reader;
+  const bool is_whole = ReadTags(in, reader);
+  const gdcm::DataSet& data = reader.GetFile().GetDataSet();
+  DicomHeader header = MakeHeader(file, data);
+  in.clear();
+  const std::streamoff at = in.tellg();
+  std::uint32_t length = 0;
+  const bool has_pixels = is_whole && IsAtPixels(in, at, length);
+  if (has_pixels) {
+    header.fault = FaultOfPixels(in, at, length, PixelBytes(data, header));
+    return MakeHeaders(std::move(header), data);
   }
-  scanner.Scan(names);
-  std::vector<DicomHeader> headers;
-  for (const std::string& name : names) {
-    if (scanner.IsKey(name.c_str())) {
-      headers.push_back(MakeHeader(scanner, name));
-    }
+  if (is_whole && IsKnownWithoutPixels(reader.GetFile())) {
+    return {};
   }
-  return headers;
+  header.fault = "it ends before its pixels";
+  header.rows = header.columns = -1;
+  return {header};
 }
 
-void AppendDicomSlice(const DicomHeader& header, VoxelArray& array) {
-  const std::string where = header.file.string();
-  try {
-    const auto io = itk::GDCMImageIO::New();
-    io->SetFileName(where);
-    io->ReadImageInformation();
-    CheckClaim(*io, header.file);
-    AppendVoxels(*io, static_cast<std::size_t>(header.columns) * header.rows, array, where);
-  } catch (const itk::ExceptionObject& error) {
-    throw IoError(fmt::format("{}: its pixels cannot be read: {}", where, ErrorText(error)));
+VoxelArray ReadDicomSlices(std::span<const DicomHeader> slices,
+                           const std::function<void(const std::string&)>& report) {
+  const LibraryScope scope;
+  VoxelArray array;
+  DicomPixels pixels;
+  for (const DicomHeader& slice : slices) {
+    if (slice.file != pixels.file) {
+      report(slice.file.string());
+      pixels = ReadPixels(slice);
+    }
+    AppendImage(pixels, slice, array);
   }
+  return array;
 }
 
 std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSeriesNames& names) {
-  SilenceLibraries();
+  const LibraryScope scope;
   gdcm::ImageWriter writer;
   PutVoxels(volume, slice, writer.GetImage());
   PutNames(names, slice, volume.spacing_mm.z(), writer.GetFile().GetDataSet());
@@ -481,7 +754,7 @@ std::string EncodeDicomSlice(const CtVolume& volume, int slice, const DicomSerie
 
 void WriteImageVolume(const CtVolume& volume, const std::filesystem::path& file,
                       VolumeFormat format) {
-  SilenceLibraries();
+  const LibraryScope scope;
   const itk::ImageIOBase::Pointer io = MakeReader(format).io;
   const std::array<int, 3> counts = {volume.columns, volume.rows, volume.slices};
   itk::ImageIORegion region(3);

@@ -10,8 +10,8 @@ namespace {
 
 [[noreturn]] void ThrowNoItk(const std::string& what) {
   throw IoError(fmt::format(
-      "{}: this program was built without ITK, and so cannot read or write DICOM, NIfTI, NRRD or "
-      "MetaImage; install libinsighttoolkit5-dev and build again",
+      "{}: this program was built without ITK, and so cannot read or write DICOM, NRRD or "
+      "MetaImage, or write NIfTI; install libinsighttoolkit5-dev and build again",
       what));
 }
 
@@ -21,11 +21,14 @@ VoxelArray ReadImageVolume(const std::filesystem::path& file, VolumeFormat) {
   ThrowNoItk(file.string());
 }
 
-std::vector<DicomHeader> ScanDicom(const std::vector<std::filesystem::path>& files) {
-  ThrowNoItk(files.empty() ? "DICOM" : files.front().parent_path().string());
+std::vector<DicomHeader> ScanDicom(const std::filesystem::path& file) {
+  ThrowNoItk(file.parent_path().string());
 }
 
-void AppendDicomSlice(const DicomHeader& header, VoxelArray&) { ThrowNoItk(header.file.string()); }
+VoxelArray ReadDicomSlices(std::span<const DicomHeader> slices,
+                           const std::function<void(const std::string&)>&) {
+  ThrowNoItk(slices.empty() ? "DICOM" : slices.front().file.string());
+}
 
 void WriteImageVolume(const CtVolume&, const std::filesystem::path& file, VolumeFormat) {
   ThrowNoItk(file.string());

@@ -6,8 +6,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <functional>
+#include <numbers>
 #include <optional>
+#include <sstream>
 #include <string>
 #include <string_view>
 #include <type_traits>
@@ -19,6 +24,7 @@
 #include "problems/io/volumes/dicom_series.h"
 #include "problems/io/volumes/invesalius.h"
 #include "problems/io/volumes/itk_files.h"
+#include "problems/io/volumes/nifti_file.h"
 #include "problems/io/volumes/volume_headers.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
@@ -100,14 +106,20 @@ void Get(std::string_view& bytes, std::optional<Value>& value) {
   value = has_value ? std::optional(stored) : std::nullopt;
 }
 
-// Calls `visit` with each member.
+// Calls `visit` with each member but the file.
 template <class Header, class Visit>
 void VisitMembers(Header& header, const Visit& visit) {
-  for (auto* text : {&header.series_uid, &header.series_number, &header.description,
-                     &header.modality, &header.image_type}) {
+  for (auto* text :
+       {&header.characters, &header.series_uid, &header.series_number, &header.description,
+        &header.modality, &header.image_type, &header.patient_id, &header.patient_name,
+        &header.birth_date, &header.space_uid, &header.lacking, &header.fault, &header.comma}) {
     visit(*text);
   }
-  for (auto* number : {&header.rows, &header.columns, &header.frames}) {
+  for (auto* number :
+       {&header.frame, &header.rows, &header.columns, &header.frames, &header.instance}) {
+    visit(*number);
+  }
+  for (auto* number : {&header.slope, &header.intercept, &header.thickness_mm, &header.tilt_deg}) {
     visit(*number);
   }
   for (auto* place : {&header.position, &header.along_columns, &header.along_rows}) {
@@ -156,18 +168,42 @@ double MemoryFor_bytes(const fs::path& file) {
                                            : kMaxVolume_bytes);
 }
 
-// Like ReadImageVolume.
+// The files of the volume. The library looks for the voxels of a detached header by rules of its
+// own, so it may look into its folder.
+std::vector<fs::path> ReadableFor(const fs::path& file) {
+  std::vector<fs::path> readable = VolumeFiles(file);
+  if (HasDetachedVoxels(file)) {
+    readable.push_back(fs::absolute(file).parent_path());
+  }
+  return readable;
+}
+
+// Like ReadNifti or ReadImageVolume.
 VoxelArray ReadImageInChild(const fs::path& file, VolumeFormat format,
                             const std::stop_token& stop) {
   return DecodeArray(RunInChildProcess(
       [&](const ReportFile& report) {
         report(file.string());
-        return EncodeArray(ReadImageVolume(file, format));
+        return EncodeArray(format == VolumeFormat::kNifti ? ReadNifti(file)
+                                                          : ReadImageVolume(file, format));
       },
-      MemoryFor_bytes(file), stop));
+      {.memory_bytes = MemoryFor_bytes(file), .readable = ReadableFor(file)}, stop));
 }
 
-// Like ScanDicom.
+// The texts that are shown or compared, as UTF-8 without control characters. Here and not in the
+// child, because the tables of the character sets are files that the system loads.
+void CleanTexts(DicomHeader& header) {
+  for (std::string* text :
+       {&header.description, &header.patient_id, &header.patient_name, &header.birth_date}) {
+    *text = DicomTextToUtf8(*text, header.characters);
+  }
+  for (std::string* text :
+       {&header.series_uid, &header.series_number, &header.modality, &header.image_type}) {
+    *text = CleanDicomText(*text);
+  }
+}
+
+// Like ScanDicom, for many files.
 std::vector<DicomHeader> ScanDicomInChild(const std::vector<fs::path>& files,
                                           const std::stop_token& stop) {
   const std::string bytes = RunInChildProcess(
@@ -175,14 +211,14 @@ std::vector<DicomHeader> ScanDicomInChild(const std::vector<fs::path>& files,
         std::string headers;
         for (std::size_t n = 0; n < files.size(); ++n) {
           report(files[n].string());
-          for (const DicomHeader& header : ScanDicom({files[n]})) {
+          for (const DicomHeader& header : ScanDicom(files[n])) {
             Put(headers, n);
             VisitMembers(header, [&](const auto& member) { Put(headers, member); });
           }
         }
         return headers;
       },
-      kWork_bytes, stop);
+      {.memory_bytes = kWork_bytes, .readable = files}, stop);
   std::vector<DicomHeader> headers;
   for (std::string_view rest = bytes; !rest.empty();) {
     std::size_t n = 0;
@@ -190,6 +226,7 @@ std::vector<DicomHeader> ScanDicomInChild(const std::vector<fs::path>& files,
     DicomHeader& header = headers.emplace_back();
     header.file = files.at(n);
     VisitMembers(header, [&](auto& member) { Get(rest, member); });
+    CleanTexts(header);
   }
   return headers;
 }
@@ -197,20 +234,15 @@ std::vector<DicomHeader> ScanDicomInChild(const std::vector<fs::path>& files,
 // Reads slices of equal size; their voxels follow each other in the array.
 VoxelArray ReadSlicesInChild(std::span<const DicomHeader> slices, const std::stop_token& stop) {
   double voxels = 0;
+  std::vector<fs::path> files;
   for (const DicomHeader& slice : slices) {
     voxels += static_cast<double>(slice.rows) * slice.columns;
+    files.push_back(slice.file);
   }
   constexpr double kBytesPerVoxel = 16;  // slice in GDCM, volume, and bytes to send, together
   return DecodeArray(RunInChildProcess(
-      [&](const ReportFile& report) {
-        VoxelArray array;
-        for (const DicomHeader& slice : slices) {
-          report(slice.file.string());
-          AppendDicomSlice(slice, array);
-        }
-        return EncodeArray(array);
-      },
-      kWork_bytes + kBytesPerVoxel * voxels, stop));
+      [&](const ReportFile& report) { return EncodeArray(ReadDicomSlices(slices, report)); },
+      {.memory_bytes = kWork_bytes + kBytesPerVoxel * voxels, .readable = files}, stop));
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -223,8 +255,9 @@ struct Ending {
 };
 constexpr std::array kEndings = {
     Ending{".nii", VolumeFormat::kNifti},     Ending{".nii.gz", VolumeFormat::kNifti},
-    Ending{".nrrd", VolumeFormat::kNrrd},     Ending{".nhdr", VolumeFormat::kNrrd},
-    Ending{".mha", VolumeFormat::kMetaImage}, Ending{".mhd", VolumeFormat::kMetaImage},
+    Ending{".hdr", VolumeFormat::kNifti},     Ending{".nrrd", VolumeFormat::kNrrd},
+    Ending{".nhdr", VolumeFormat::kNrrd},     Ending{".mha", VolumeFormat::kMetaImage},
+    Ending{".mhd", VolumeFormat::kMetaImage},
 };
 
 std::string LowerCaseName(const fs::path& path) { return LowerCase(path.filename().string()); }
@@ -255,68 +288,117 @@ void NoteGeometry(const CtVolume& volume, std::vector<std::string>& notes) {
                               volume.spacing_mm.y(), volume.spacing_mm.z()));
 }
 
+// Notes axes that are not at right angles, which a tilted gantry makes. Throws InputError for more
+// than a gantry can be tilted.
+void CheckSkewness(const CtVolume& volume, const std::string& where,
+                   std::vector<std::string>& notes) {
+  constexpr double kMinNoted_deg = 0.5;  // rounded positions alone can look like less
+  constexpr double kMaxTilt_deg = 40;    // scanners allow 30
+  const Mat3 cosines = volume.axes.transpose() * volume.axes;
+  const double largest =
+      std::max({std::abs(cosines(0, 1)), std::abs(cosines(0, 2)), std::abs(cosines(1, 2))});
+  const double skew_deg = std::asin(std::min(largest, 1.0)) * 180 / std::numbers::pi;
+  if (skew_deg > kMaxTilt_deg) {
+    throw InputError(fmt::format(
+        "{}: its axes are {:.1f} deg off right angles, and a tilted gantry makes at most {}; "
+        "correct its header, or export it again",
+        where, skew_deg, kMaxTilt_deg));
+  }
+  if (skew_deg > kMinNoted_deg) {
+    notes.push_back(fmt::format(
+        "the gantry was tilted by {:.1f} deg, or the volume is skew for another reason: the slices "
+        "are not resampled, their places in space are exact",
+        skew_deg));
+  }
+}
+
 VolumeReading Finish(VoxelArray array, VolumeReading reading, const std::string& where) {
   std::vector<std::string> notes = array.notes;
   CheckValues(array, where, notes);
   reading.volume = ToCtVolume(std::move(array), where);
   NoteGeometry(reading.volume, reading.notes);
+  CheckSkewness(reading.volume, where, reading.notes);
   reading.notes.insert(reading.notes.end(), notes.begin(), notes.end());
   return reading;
 }
 
-// Interpolates a missing slice between the nearest slices below and above that are present.
-void InterpolateSlice(const SliceStack& stack, std::size_t slice, VoxelArray& array) {
-  const auto present = [&](std::size_t k) { return stack.slices[k] >= 0; };
-  std::size_t below = slice, above = slice;
-  while (!present(below)) {
-    --below;
+// The slices of the stack: scanned ones, and ones interpolated between two scanned ones.
+std::vector<std::int16_t> MakeSlices(const SliceStack& stack, std::vector<std::int16_t> scanned) {
+  const auto is_scanned = [](double place) { return place == std::floor(place); };
+  if (std::ranges::all_of(stack.places, is_scanned)) {
+    return scanned;
   }
-  while (!present(above)) {
-    ++above;
-  }
-  const std::size_t size = static_cast<std::size_t>(array.counts[0]) * array.counts[1];
-  const double t = static_cast<double>(slice - below) / static_cast<double>(above - below);
-  for (std::size_t n = 0; n < size; ++n) {
-    const double low = array.values[below * size + n], high = array.values[above * size + n];
-    array.values[slice * size + n] = static_cast<std::int16_t>(std::lround(low + t * (high - low)));
-  }
-}
-
-// The slices of the stack that are present, in its order.
-std::vector<DicomHeader> PresentSlices(const DicomSeries& series, const SliceStack& stack) {
-  std::vector<DicomHeader> present;
-  for (const int slice : stack.slices) {
-    if (slice >= 0) {
-      present.push_back(series.slices[slice]);
+  const std::size_t size = scanned.size() / stack.scanned.size();
+  std::vector<std::int16_t> values;
+  values.reserve(size * stack.places.size());
+  for (const double place : stack.places) {
+    const auto below = static_cast<std::size_t>(place);
+    const std::size_t above = std::min(below + 1, stack.scanned.size() - 1);
+    const double t = place - static_cast<double>(below);
+    for (std::size_t n = 0; n < size; ++n) {
+      const double low = scanned[below * size + n], high = scanned[above * size + n];
+      values.push_back(static_cast<std::int16_t>(std::lround(low + t * (high - low))));
     }
   }
-  return present;
+  return values;
 }
 
-// Reads all slices of the stack in its order, and interpolates missing ones.
+// The median of the differences between a slice and another one.
+int MedianDifference(std::span<const std::int16_t> slice, std::span<const std::int16_t> other) {
+  std::vector<int> differences(slice.size());
+  std::ranges::transform(slice, other, differences.begin(), std::minus<int>());
+  const auto middle = differences.begin() + static_cast<std::ptrdiff_t>(differences.size() / 2);
+  std::ranges::nth_element(differences, middle);
+  return *middle;
+}
+
+// Throws InputError if most voxels of a slice differ from those of both neighbours by about the
+// same amount: its values have another offset, such as a rescale intercept that is lost. names: of
+// the slices. Volumes without values of air in Hounsfield units are not checked.
+void CheckOffsets(std::span<const std::int16_t> values, std::span<const std::string> names,
+                  const std::string& where) {
+  constexpr int kOffset =
+      300;  // beyond the difference of air, fat and soft tissue to the next slice
+  constexpr int kAir = -500;
+  if (names.size() < 3 || *std::ranges::min_element(values) > kAir) {
+    return;
+  }
+  const std::size_t size = values.size() / names.size();
+  std::vector<int> steps;  // from each slice to the next
+  for (std::size_t k = 0; k + 1 < names.size(); ++k) {
+    steps.push_back(
+        MedianDifference(values.subspan((k + 1) * size, size), values.subspan(k * size, size)));
+  }
+  for (std::size_t k = 0; k < names.size(); ++k) {
+    const int below = k > 0 ? steps[k - 1] : -steps[k];
+    const int above = k + 1 < names.size() ? steps[k] : -steps[k - 1];
+    if (std::min(std::abs(below), std::abs(above)) > kOffset && (below > 0) != (above > 0)) {
+      throw InputError(fmt::format(
+          "{}: the values of {} are about {} {} than those of the slices beside it: its offset "
+          "({}) or its values are lost; export the series again",
+          where, names[k], std::abs(below), below > 0 ? "higher" : "lower", kInterceptTag));
+    }
+  }
+}
+
+// Reads the scanned slices of the stack in its order, and makes those of the stack.
 void ReadSlices(const DicomSeries& series, const SliceStack& stack, const std::string& where,
                 const RunContext& context, VoxelArray& array) {
-  const std::size_t size = static_cast<std::size_t>(array.counts[0]) * array.counts[1];
   CheckVolumeClaim(
       {.counts = {static_cast<double>(array.counts[0]), static_cast<double>(array.counts[1]),
-                  static_cast<double>(stack.slices.size())}},
+                  static_cast<double>(stack.places.size())}},
       where);
-  const VoxelArray read = ReadSlicesInChild(PresentSlices(series, stack), context.stop_token);
+  std::vector<DicomHeader> slices;
+  std::vector<std::string> names;
+  for (const int slice : stack.scanned) {
+    slices.push_back(series.slices[slice]);
+    names.push_back(slices.back().file.filename().string());
+  }
+  VoxelArray read = ReadSlicesInChild(slices, context.stop_token);
+  CheckOffsets(read.values, names, where);
   array.clipped = read.clipped;
   array.not_finite = read.not_finite;
-  array.values.resize(size * stack.slices.size());
-  auto from = read.values.begin();
-  for (std::size_t k = 0; k < stack.slices.size(); ++k) {
-    if (stack.slices[k] >= 0) {
-      std::copy_n(from, size, array.values.begin() + static_cast<std::ptrdiff_t>(k * size));
-      from += static_cast<std::ptrdiff_t>(size);
-    }
-  }
-  for (std::size_t k = 0; k < stack.slices.size(); ++k) {
-    if (stack.slices[k] < 0) {
-      InterpolateSlice(stack, k, array);
-    }
-  }
+  array.values = MakeSlices(stack, std::move(read.values));
 }
 
 SliceStack MakeStack(const DicomSeries& series, const Vec3& normal,
@@ -331,17 +413,6 @@ SliceStack MakeStack(const DicomSeries& series, const Vec3& normal,
                      fmt::format("{}: series {}", where, series.name));
 }
 
-void NoteTilt(const SliceStack& stack, const Vec3& normal, std::vector<std::string>& notes) {
-  constexpr double kMinNotedTilt_deg = 0.5;  // rounded positions alone can look like less
-  const double tilt_deg = TiltDeg(stack, normal);
-  if (tilt_deg > kMinNotedTilt_deg) {
-    notes.push_back(fmt::format(
-        "the gantry was tilted by {:.1f} deg: the slices are not resampled, their places in space "
-        "are exact",
-        tilt_deg));
-  }
-}
-
 VolumeReading ReadSeries(const DicomSeries& series, const ReadVolumeOptions& options,
                          const RunContext& context, VolumeReading reading,
                          const std::string& where) {
@@ -350,9 +421,9 @@ VolumeReading ReadSeries(const DicomSeries& series, const ReadVolumeOptions& opt
   const SliceStack stack = MakeStack(series, normal, options, where);
   reading.notes.push_back(fmt::format("series {}", DescribeSeries(series)));
   reading.notes.insert(reading.notes.end(), stack.notes.begin(), stack.notes.end());
-  NoteTilt(stack, normal, reading.notes);
+  NoteSliceTags(series, stack, normal, reading.notes);
   VoxelArray array;
-  array.counts = {first.columns, first.rows, static_cast<int>(stack.slices.size())};
+  array.counts = {first.columns, first.rows, static_cast<int>(stack.places.size())};
   array.origin = stack.origin;
   array.steps << first.spacing_mm->x() * *first.along_columns,
       first.spacing_mm->y() * *first.along_rows, stack.step;
@@ -361,6 +432,21 @@ VolumeReading ReadSeries(const DicomSeries& series, const ReadVolumeOptions& opt
                      : first.modality == "CT" ? Modality::kCt
                                               : Modality::kUnknown;
   return Finish(std::move(array), std::move(reading), where);
+}
+
+// Throws IoError for empty files that are named like the slices, because copying them failed.
+void RequireNoEmptyFiles(const std::vector<fs::path>& files,
+                         const std::vector<DicomHeader>& headers, const std::string& where) {
+  for (const fs::path& file : files) {
+    const bool is_like_slice = std::ranges::any_of(headers, [&](const DicomHeader& header) {
+      return header.file.parent_path() == file.parent_path() &&
+             header.file.extension() == file.extension();
+    });
+    if (is_like_slice && fs::file_size(file) == 0) {
+      throw IoError(fmt::format("{}: the file {} is empty; copy it again, or remove it", where,
+                                file.filename().string()));
+    }
+  }
 }
 
 VolumeReading ReadDicomFolder(const fs::path& folder, const ReadVolumeOptions& options,
@@ -372,6 +458,7 @@ VolumeReading ReadDicomFolder(const fs::path& folder, const ReadVolumeOptions& o
     throw IoError(
         fmt::format("{}: none of the {} files in the folder is DICOM", where, files.size()));
   }
+  RequireNoEmptyFiles(files, headers, where);
   VolumeReading reading;
   const std::vector<DicomSeries> all = GroupSeries(headers, reading.notes);
   if (all.empty()) {
@@ -380,6 +467,7 @@ VolumeReading ReadDicomFolder(const fs::path& folder, const ReadVolumeOptions& o
                                  fmt::join(reading.notes, "; ")));
   }
   const DicomSeries& series = ChooseSeries(all, options.series, where, reading.notes);
+  CheckSeries(series, headers, fmt::format("{}: series {}", where, series.name), reading.notes);
   return ReadSeries(series, options, context, std::move(reading), where);
 }
 
@@ -394,10 +482,113 @@ VolumeReading ReadFile(const fs::path& path, const RunContext& context) {
   if (!format) {
     throw InputError(fmt::format(
         "{}: not a kind of volume that is read; allowed are a folder of DICOM files (for a "
-        "single slice name its folder), .nii, .nii.gz, .nrrd, .nhdr, .mha, .mhd and .inv3",
+        "single slice name its folder), .nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd and .inv3",
         where));
   }
-  return Finish(ReadImageInChild(path, *format, context.stop_token), {}, where);
+  VoxelArray array = ReadImageInChild(path, *format, context.stop_token);
+  std::vector<std::string> names;
+  for (int slice = 1; slice <= array.counts[2]; ++slice) {
+    names.push_back(fmt::format("slice {}", slice));
+  }
+  CheckOffsets(array.values, names, where);
+  return Finish(std::move(array), {}, where);
+}
+
+// ---------------------------------------------------------------------------------------------
+// Voxels in files of their own
+// ---------------------------------------------------------------------------------------------
+
+// A header may name many files, e.g. one per slice. A hostile one names more.
+constexpr std::size_t kMaxVoxelFiles = 100'000;
+
+// The names that a pattern such as "slice%03d.raw" gives for the numbers first, first + step ...
+// last. Empty if it is no such pattern.
+std::vector<std::string> ExpandPattern(const std::string& pattern, long first, long last,
+                                       long step) {
+  const std::size_t begin = pattern.find('%');
+  const std::size_t end = pattern.find_first_not_of("0123456789", begin + 1);
+  if (begin == pattern.npos || end == pattern.npos || pattern[end] != 'd' || step == 0) {
+    return {};
+  }
+  const std::string digits = pattern.substr(begin + 1, end - begin - 1);
+  const std::size_t width = std::min(20UL, std::strtoul(digits.c_str(), nullptr, 10));
+  std::vector<std::string> names;
+  for (long n = first; (step > 0 ? n <= last : n >= last) && names.size() < kMaxVoxelFiles;
+       n += step) {
+    std::string number = std::to_string(n);
+    number.insert(0, width - std::min(width, number.size()), digits.starts_with('0') ? '0' : ' ');
+    names.push_back(pattern.substr(0, begin) + number + pattern.substr(end + 1));
+  }
+  return names;
+}
+
+// The files that a value such as "h.raw", "LIST" or "slice%03d.raw 1 82 1" of a header names.
+// following: the lines behind it, which are the list.
+std::vector<std::string> ParseVoxelNames(const std::string& value, std::istream& following) {
+  std::istringstream words(value);
+  std::string word;
+  long first = 0, last = 0, step = 1;
+  words >> word;
+  if (word.starts_with("LIST")) {
+    std::vector<std::string> names;
+    for (std::string line; std::getline(following, line) && names.size() < kMaxVoxelFiles;) {
+      line.erase(line.find_last_not_of(" \t\r") + 1);
+      if (!line.empty()) {
+        names.push_back(line);
+      }
+    }
+    return names;
+  }
+  if (words >> first >> last) {
+    words >> step;
+    return ExpandPattern(word, first, last, step);
+  }
+  return LowerCase(word) == "local" ? std::vector<std::string>() : std::vector{value};
+}
+
+// The files that the text of a MetaImage's or NRRD's header names.
+std::vector<std::string> ReadVoxelNames(const fs::path& path, VolumeFormat format) {
+  constexpr std::size_t kMaxHeader_bytes = 1 << 20;
+  const bool is_nrrd = format == VolumeFormat::kNrrd;
+  std::string head(kMaxHeader_bytes, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  std::istringstream lines(head);
+  for (std::string line; std::getline(lines, line);) {
+    const std::size_t sign = line.find(is_nrrd ? ':' : '=');
+    std::string name = LowerCase(line.substr(0, sign)), value;
+    std::erase_if(name, [](char c) { return c == ' ' || c == '\t'; });
+    if (sign != line.npos && name == (is_nrrd ? "datafile" : "elementdatafile")) {
+      value = line.substr(std::min(line.size(), line.find_first_not_of(" \t", sign + 1)));
+      value.erase(value.find_last_not_of(" \t\r") + 1);
+      return ParseVoxelNames(value, lines);
+    }
+    if (line.find_first_not_of("\r") == line.npos && is_nrrd) {
+      break;  // the voxels follow
+    }
+  }
+  return {};
+}
+
+// The files with the voxels, if the file is only a header. They need not exist.
+std::vector<fs::path> FindVoxelFiles(const fs::path& path) {
+  const std::optional<VolumeFormat> format = FindVolumeFormat(path);
+  std::vector<fs::path> files;
+  if (format == VolumeFormat::kMetaImage || format == VolumeFormat::kNrrd) {
+    for (const std::string& name : ReadVoxelNames(path, *format)) {
+      files.push_back(path.parent_path() / name);
+    }
+  } else if (format == VolumeFormat::kNifti || LowerCaseName(path).ends_with(".hdr")) {
+    // A NIfTI or Analyze header is beside its image.
+    for (const char* ending : {".img", ".img.gz"}) {
+      const fs::path image = fs::path(path).replace_extension(ending);
+      if (fs::exists(image)) {
+        files.push_back(image);
+      }
+    }
+  }
+  return files;
 }
 
 }  // namespace
@@ -413,8 +604,11 @@ std::optional<VolumeFormat> FindVolumeFormat(const fs::path& path) {
 }
 
 std::vector<fs::path> VolumeFiles(const fs::path& path) {
-  if (!fs::is_directory(path)) {
-    return {path};
+  std::error_code ignored;  // a path that cannot be reached is a file that cannot be read
+  if (!fs::is_directory(path, ignored)) {
+    std::vector<fs::path> files = FindVoxelFiles(path);
+    files.insert(files.begin(), path);
+    return files;
   }
   std::vector<fs::path> files;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(path)) {

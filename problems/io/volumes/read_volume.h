@@ -39,7 +39,8 @@ VolumeReading ReadVolume(const std::filesystem::path& path, const ReadVolumeOpti
 // The format of a file with a whole volume, by the ending of its name; empty for other endings.
 std::optional<VolumeFormat> FindVolumeFormat(const std::filesystem::path& file);
 
-// The files that ReadVolume reads: the path itself, or all files below the folder, sorted.
+// The files that ReadVolume reads: the path itself and, if it is only a header (.mhd, .nhdr), the
+// files of the voxels that it names, which need not exist; or all files below the folder, sorted.
 std::vector<std::filesystem::path> VolumeFiles(const std::filesystem::path& path);
 
 }  // namespace semblance::problems

@@ -5,20 +5,16 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <charconv>
 #include <cmath>
-#include <cstdint>
-#include <cstdlib>
-#include <cstring>
-#include <fstream>
-#include <functional>
 #include <map>
 #include <optional>
-#include <span>
+#include <sstream>
 #include <string>
 #include <string_view>
+#include <system_error>
+#include <vector>
 
-#include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/lower_case.h"
@@ -31,8 +27,9 @@ namespace {
 // Lines of a header
 // ---------------------------------------------------------------------------------------------
 
-// Values by names in lower case. If a name repeats, the first value counts.
-using HeaderLines = std::map<std::string, std::string>;
+struct HeaderLine {
+  std::string name, value;
+};
 
 std::string_view Trimmed(std::string_view text) {
   constexpr std::string_view kBlanks = " \t\r\n";
@@ -41,8 +38,9 @@ std::string_view Trimmed(std::string_view text) {
 }
 
 // Parses lines of the form NAME sign VALUE, up to a line whose name, or whole text, is `last`.
-HeaderLines ParseHeaderLines(std::string_view head, std::string_view sign, std::string_view last) {
-  HeaderLines lines;
+std::vector<HeaderLine> ParseLines(std::string_view head, std::string_view sign,
+                                   std::string_view last) {
+  std::vector<HeaderLine> lines;
   while (!head.empty()) {
     const std::size_t end = std::min(head.find('\n'), head.size() - 1);
     const std::string_view line = Trimmed(head.substr(0, end + 1));
@@ -53,11 +51,14 @@ HeaderLines ParseHeaderLines(std::string_view head, std::string_view sign, std::
       return lines;
     }
     if (at != line.npos && !line.starts_with('#')) {
-      lines.emplace(LowerCase(std::string(name)), Trimmed(line.substr(at + sign.size())));
+      lines.push_back({std::string(name), std::string(Trimmed(line.substr(at + sign.size())))});
     }
   }
   return lines;
 }
+
+// Values by names in lower case. If a name repeats, the first value counts.
+using HeaderLines = std::map<std::string, std::string>;
 
 // Empty if there is no such line.
 std::string HeaderValue(const HeaderLines& lines, const std::string& name) {
@@ -169,21 +170,17 @@ const NrrdSpace& FindSpace(const std::string& space, const std::string& where) {
 std::vector<Vec3> ParseVectors(const std::string& text, const std::string& where) {
   std::vector<Vec3> vectors;
   for (std::size_t at = text.find('('); at != text.npos; at = text.find('(', at + 1)) {
-    const char* rest = text.c_str() + at;
-    Vec3 vector;
-    for (int a = 0; a < 3; ++a) {
-      char* end = nullptr;
-      vector[a] = std::strtod(rest + 1, &end);
-      end += std::strspn(end, " \t");
-      const bool is_separated = *end == ',' || (a == 2 && *end == ')');
-      if (!is_separated) {
-        throw InputError(
-            fmt::format("{}: '{}' in its header are not vectors of three numbers; export it again",
-                        where, Shown(text)));
-      }
-      rest = end;
+    std::istringstream parts(text.substr(at + 1, text.find(')', at) - at - 1));
+    Vec3& vector = vectors.emplace_back(Vec3::Constant(kNaN));
+    std::string part;
+    for (int a = 0; a < 3 && std::getline(parts, part, ','); ++a) {
+      vector[a] = ParseNumber(part).value_or(kNaN);
     }
-    vectors.push_back(vector);
+    if (!vector.allFinite()) {
+      throw InputError(
+          fmt::format("{}: '{}' in its header are not vectors of three numbers; export it again",
+                      where, Shown(text)));
+    }
   }
   return vectors;
 }
@@ -222,118 +219,175 @@ void NoteAssumptions(const HeaderLines& lines, const NrrdSpace* space, HeaderPla
                                     why, has_spacing ? "" : ", its voxels 1 mm apart"));
 }
 
+// The library of NRRD reads each number up to its first odd character.
+void CheckNrrdSpacings(const HeaderLines& lines, const std::string& where) {
+  std::istringstream words(HeaderValue(lines, "spacings"));
+  for (std::string word; words >> word;) {
+    const std::optional<double> spacing = ParseNumber(word);
+    const bool is_unknown = LowerCase(word) == "nan";  // of an axis that is not one of space
+    if (!is_unknown && !(spacing && *spacing > 0)) {
+      throw InputError(
+          fmt::format("{}: '{}' among the spacings of its header is not a number > 0; "
+                      "export it again",
+                      where, Shown(word)));
+    }
+  }
+}
+
 // ---------------------------------------------------------------------------------------------
-// NIfTI
+// MetaImage
 // ---------------------------------------------------------------------------------------------
 
-constexpr std::size_t kNiftiHeader_bytes = 348;
-
-struct NiftiHeader {
-  int datatype = -1;                     // NIfTI's code of the stored type of a voxel
-  double voxels_at = kNaN;               // offset of the voxels, bytes
-  int qform_code = -1, sform_code = -1;  // > 0: the header has a quaternion, a matrix
-  std::array<float, 3> steps{};          // distance of voxels along each axis
-  std::array<float, 6> quaternion{};     // and its offset
-  std::array<float, 12> matrix{};        // rows
+// Fields of numbers, and how many there are: 0: one per axis, -1: one per pair of axes.
+struct MetaField {
+  std::string_view name;
+  int count;
 };
+constexpr std::array kMetaNumbers = {
+    MetaField{"TransformMatrix", -1},
+    MetaField{"Rotation", -1},
+    MetaField{"Orientation", -1},
+    MetaField{"Offset", 0},
+    MetaField{"Position", 0},
+    MetaField{"Origin", 0},
+    MetaField{"CenterOfRotation", 0},
+    MetaField{"ElementSpacing", 0},
+    MetaField{"ElementSize", 0},
+    MetaField{"DimSize", 0},
+    MetaField{"NDims", 1},
+    MetaField{"HeaderSize", 1},
+    MetaField{"ElementNumberOfChannels", 1},
+    MetaField{"ElementToIntensityFunctionSlope", 1},
+    MetaField{"ElementToIntensityFunctionOffset", 1},
+};
+constexpr std::array<std::string_view, 9> kMetaTexts = {
+    "BinaryData",         "BinaryDataByteOrderMSB", "ElementByteOrderMSB", "CompressedData",
+    "CompressedDataSize", "AnatomicalOrientation",  "DistanceUnits",       "ElementType",
+    "ElementDataFile"};
 
-// Fewer bytes if the file ends before.
-std::string ReadNiftiHeaderBytes(const std::filesystem::path& file) {
-  std::string bytes;
-  if (IsGzip(file)) {
-    Unpack(file, [&](std::string_view block) {
-      bytes += block.substr(0, kNiftiHeader_bytes - bytes.size());
-      return bytes.size() < kNiftiHeader_bytes;
-    });
-    return bytes;
-  }
-  bytes.resize(kNiftiHeader_bytes);
-  std::ifstream in(file, std::ios::binary);
-  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(in.gcount()));
-  return bytes;
+// MetaImage's name of the field that has this name but for capital letters; empty if there is none.
+std::string_view MetaName(const std::string& name) {
+  const auto same = [&](std::string_view known) {
+    return LowerCase(std::string(known)) == LowerCase(name);
+  };
+  const auto number = std::ranges::find_if(kMetaNumbers, same, &MetaField::name);
+  const auto text = std::ranges::find_if(kMetaTexts, same);
+  return number != kMetaNumbers.end() ? number->name
+         : text != kMetaTexts.end()   ? *text
+                                      : std::string_view();
 }
 
-// A value of the header; `swapped` reverses its bytes.
-template <class Value>
-Value ValueAt(const std::string& header, std::size_t at, bool swapped) {
-  std::array<char, sizeof(Value)> bytes{};
-  std::memcpy(bytes.data(), header.data() + at, bytes.size());
-  if (swapped) {
-    std::ranges::reverse(bytes);
+// The lines by their names. The library ignores names with other capital letters, and uses the last
+// one of repeated fields.
+HeaderLines ParseMetaImageLines(std::string_view head, const std::string& where) {
+  HeaderLines lines;
+  for (const HeaderLine& line : ParseLines(head, "=", "ElementDataFile")) {
+    const std::string_view known = MetaName(line.name);
+    if (!known.empty() && known != line.name) {
+      throw InputError(fmt::format("{}: '{}' in its header is not a field of MetaImage; write '{}'",
+                                   where, line.name, known));
+    }
+    if (!lines.emplace(line.name, line.value).second && !known.empty()) {
+      throw InputError(
+          fmt::format("{}: its header has {} twice; remove the wrong one", where, line.name));
+    }
   }
-  return std::bit_cast<Value>(bytes);
+  return lines;
 }
 
-template <std::size_t count>
-void ReadFloats(const std::string& header, std::size_t at, bool swapped,
-                std::array<float, count>& values) {
-  for (std::size_t k = 0; k < count; ++k) {
-    values[k] = ValueAt<float>(header, at + sizeof(float) * k, swapped);
+// The library loops over as many axes as the header claims, without a limit. Returns 0 if the
+// header does not state them, because the library reports what is missing.
+int MetaImageAxes(const HeaderLines& lines, const std::string& where) {
+  const std::string text = HeaderValue(lines, "NDims");
+  constexpr double kMaxAxes = 10;  // the limit of the library
+  const double axes = ParseNumber(text).value_or(kNaN);
+  if (!text.empty() && !(axes >= 1 && axes <= kMaxAxes && axes == std::floor(axes))) {
+    throw InputError(fmt::format("{}: NDims is not a number of axes; a volume has 3", where));
+  }
+  return text.empty() ? 0 : static_cast<int>(axes);
+}
+
+void CheckMetaImageNumbers(const std::string& name, const std::string& value, int axes,
+                           const std::string& where) {
+  const auto field = std::ranges::find(kMetaNumbers, name, &MetaField::name);
+  if (field == kMetaNumbers.end() || axes == 0) {
+    return;
+  }
+  const int expected = field->count == 0 ? axes : field->count < 0 ? axes * axes : field->count;
+  int count = 0;
+  bool are_numbers = true;
+  std::istringstream words(value);
+  for (std::string word; words >> word; ++count) {
+    are_numbers = are_numbers && ParseNumber(word).has_value();
+  }
+  if (!are_numbers || count != expected) {
+    throw InputError(fmt::format(
+        "{}: {} in its header is '{}', which is not {} (with a decimal point); export it again",
+        where, name, Shown(value),
+        expected == 1 ? "a number" : fmt::format("{} numbers", expected)));
   }
 }
 
-// The stored size of a voxel; 0 for types other than one real number.
-double NiftiVoxel_bytes(int datatype) {
-  switch (datatype) {
-    case 2:    // uint8
-    case 256:  // int8
-      return 1;
-    case 4:    // int16
-    case 512:  // uint16
-      return 2;
-    case 8:    // int32
-    case 768:  // uint32
-    case 16:   // float32
-      return 4;
-    case 1024:  // int64
-    case 1280:  // uint64
-    case 64:    // float64
-      return 8;
-    default:
-      return 0;
+// The library tests the first letter.
+bool IsTrue(const std::string& value) {
+  return value.starts_with('T') || value.starts_with('t') || value.starts_with('1');
+}
+
+// The library uses the last one of two fields for the order of bytes.
+void CheckByteOrder(const HeaderLines& lines, const std::string& where) {
+  const std::string binary = HeaderValue(lines, "BinaryDataByteOrderMSB"),
+                    element = HeaderValue(lines, "ElementByteOrderMSB");
+  if (!binary.empty() && !element.empty() && IsTrue(binary) != IsTrue(element)) {
+    throw InputError(fmt::format(
+        "{}: BinaryDataByteOrderMSB and ElementByteOrderMSB in its header contradict each other; "
+        "remove the wrong one",
+        where));
   }
 }
 
-// Empty if the file is shorter than a header.
-std::optional<NiftiHeader> ReadNiftiHeader(const std::filesystem::path& file) {
-  const std::string bytes = ReadNiftiHeaderBytes(file);
-  if (bytes.size() < kNiftiHeader_bytes) {
-    return std::nullopt;
+// Notes a header without a matrix. AnatomicalOrientation cannot replace it, because programs
+// disagree whether its letters name the side where an axis begins or ends; "RAI" and "LPS" mean the
+// frame LPS in one of the two ways, and its direction is what a file without a matrix is taken as.
+void CheckMetaImageOrientation(const HeaderLines& lines, const std::string& where,
+                               HeaderPlace& place) {
+  if (lines.contains("TransformMatrix") || lines.contains("Rotation") ||
+      lines.contains("Orientation")) {
+    return;
   }
-  const bool swapped = ValueAt<std::int32_t>(bytes, 0, /*swapped=*/true) == kNiftiHeader_bytes;
-  NiftiHeader header;
-  header.datatype = ValueAt<std::int16_t>(bytes, 70, swapped);
-  // If the stored offset is not a number, std::max returns the end of the header.
-  header.voxels_at = std::max<double>(kNiftiHeader_bytes, ValueAt<float>(bytes, 108, swapped));
-  header.qform_code = ValueAt<std::int16_t>(bytes, 252, swapped);
-  header.sform_code = ValueAt<std::int16_t>(bytes, 254, swapped);
-  ReadFloats(bytes, 80, swapped, header.steps);
-  ReadFloats(bytes, 256, swapped, header.quaternion);
-  ReadFloats(bytes, 280, swapped, header.matrix);
-  return header;
-}
-
-// The unpacked size of the file. Stops unpacking, and returns more than `enough`, once that is
-// exceeded.
-double UnpackedSize(const std::filesystem::path& file, double enough) {
-  if (!IsGzip(file)) {
-    return static_cast<double>(std::filesystem::file_size(file));
+  const std::string letters = HeaderValue(lines, "AnatomicalOrientation");
+  if (!letters.empty() && letters != "RAI" && letters != "LPS" && !letters.starts_with('?')) {
+    throw InputError(fmt::format(
+        "{}: its header has AnatomicalOrientation = {} but no TransformMatrix, which alone places "
+        "the voxels; add it, e.g. TransformMatrix = 1 0 0 0 1 0 0 0 1 for columns to the left, "
+        "rows to the back and slices upwards",
+        where, Shown(letters)));
   }
-  double count = 0;
-  Unpack(file, [&](std::string_view block) {
-    count += static_cast<double>(block.size());
-    return count <= enough;
-  });
-  return count;
+  place.notes.emplace_back(
+      "the file does not state its orientation (its header has no 'TransformMatrix'); taken as "
+      "LPS");
 }
 
 }  // namespace
 
+std::optional<double> ParseNumber(std::string_view text) {
+  text = Trimmed(text);
+  if (text.starts_with('+')) {  // from_chars rejects a plus sign
+    text.remove_prefix(1);
+  }
+  double value = kNaN;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  const bool is_whole = error == std::errc() && end == text.data() + text.size();
+  return is_whole && std::isfinite(value) ? std::optional(value) : std::nullopt;
+}
+
 HeaderPlace ParseNrrdPlace(std::string_view head, const std::string& where) {
-  const HeaderLines lines = ParseHeaderLines(head, ": ", "");
+  HeaderLines lines;
+  for (const HeaderLine& line : ParseLines(head, ": ", "")) {
+    lines.emplace(LowerCase(line.name), line.value);
+  }
   const std::string name = HeaderValue(lines, "space");
   const NrrdSpace* const space = name.empty() ? nullptr : &FindSpace(name, where);
+  CheckNrrdSpacings(lines, where);
   HeaderPlace place;
   SetSteps(lines, space, where, place);
   SetUnit(QuotedUnit(HeaderValue(lines, lines.contains("space units") ? "space units" : "units")),
@@ -342,18 +396,35 @@ HeaderPlace ParseNrrdPlace(std::string_view head, const std::string& where) {
   return place;
 }
 
-HeaderPlace ParseMetaImagePlace(std::string_view head) {
-  const HeaderLines lines = ParseHeaderLines(head, "=", "ElementDataFile");
-  HeaderPlace place;
-  const std::string unit = HeaderValue(lines, "distanceunits");
-  SetUnit(unit == "?" ? "" : unit, place);
-  if (!lines.contains("transformmatrix") && !lines.contains("rotation") &&
-      !lines.contains("orientation")) {
-    place.notes.emplace_back(
-        "the file does not state its orientation (its header has no 'TransformMatrix'); taken as "
-        "LPS");
+HeaderPlace ParseMetaImagePlace(std::string_view head, const std::string& where) {
+  const HeaderLines lines = ParseMetaImageLines(head, where);
+  const int axes = MetaImageAxes(lines, where);
+  for (const auto& [name, value] : lines) {
+    CheckMetaImageNumbers(name, value, axes, where);
   }
+  HeaderPlace place;
+  const std::string unit = HeaderValue(lines, "DistanceUnits");
+  SetUnit(unit == "?" ? "" : unit, place);
+  place.slope = ParseNumber(HeaderValue(lines, "ElementToIntensityFunctionSlope")).value_or(1);
+  place.intercept = ParseNumber(HeaderValue(lines, "ElementToIntensityFunctionOffset")).value_or(0);
+  if (place.slope != 1 || place.intercept != 0) {
+    place.notes.push_back(
+        fmt::format("the values were multiplied by {} and {} was added, as its "
+                    "ElementToIntensityFunctionSlope and -Offset state",
+                    place.slope, place.intercept));
+  }
+  CheckByteOrder(lines, where);
+  CheckMetaImageOrientation(lines, where, place);
   return place;
+}
+
+bool IsCompressedMetaImage(std::string_view head) {
+  for (const HeaderLine& line : ParseLines(head, "=", "ElementDataFile")) {
+    if (line.name == "CompressedData") {
+      return IsTrue(line.value);
+    }
+  }
+  return false;
 }
 
 bool HasDetachedVoxels(const std::filesystem::path& file) {
@@ -369,52 +440,6 @@ void ApplyPlace(const HeaderPlace& place, VoxelArray& array) {
   array.steps *= place.to_mm;
   array.origin *= place.to_mm;
   array.notes.insert(array.notes.end(), place.notes.begin(), place.notes.end());
-}
-
-void CheckNiftiPlace(const std::filesystem::path& file) {
-  constexpr double kMaxCoordinate_mm = 1e9;  // far beyond any head, far below overflow
-  const std::optional<NiftiHeader> header = ReadNiftiHeader(file);
-  if (!header) {
-    return;
-  }
-  const auto check = [&](std::span<const float> values) {
-    for (const double value : values) {
-      if (!(std::abs(value) <= kMaxCoordinate_mm)) {
-        throw InputError(
-            fmt::format("{}: one of the numbers that place its voxels is {}; export it again",
-                        file.string(), value));
-      }
-    }
-  };
-  check(header->steps);
-  if (header->qform_code > 0) {
-    check(header->quaternion);
-  }
-  if (header->sform_code > 0) {
-    check(header->matrix);
-  }
-}
-
-bool NiftiHasPlace(const std::filesystem::path& file) {
-  const std::optional<NiftiHeader> header = ReadNiftiHeader(file);
-  return header && (header->qform_code > 0 || header->sform_code > 0);
-}
-
-void CheckNiftiWhole(const std::filesystem::path& file, double voxels) {
-  // Unpacking this much more reaches the end of the gzip member, and so verifies its checksum.
-  constexpr double kEndOfMember_bytes = 1 << 20;
-  const std::optional<NiftiHeader> header = ReadNiftiHeader(file);
-  if (!header) {
-    return;
-  }
-  const double needed = voxels * NiftiVoxel_bytes(header->datatype);
-  const double whole = header->voxels_at + needed;
-  if (UnpackedSize(file, whole + kEndOfMember_bytes) < whole) {
-    throw IoError(
-        fmt::format("{}: the file is cut short: {:.0f} bytes of voxels are needed; copy or export "
-                    "it again",
-                    file.string(), needed));
-  }
 }
 
 }  // namespace semblance::problems
