@@ -123,6 +123,7 @@ class FaceJob {
   void TessellateFace();
   void EstimateUncertainty();
   void MeasureFace();
+  void Judge();
   void PutFaceOnBust();
   RunResult TakeResult();
 
@@ -147,6 +148,7 @@ class FaceJob {
   Tessellation face_;
   std::optional<FaceUncertainty> uncertainty_;
   std::optional<TruthComparison> truth_;
+  Plausibility plausibility_;
   std::optional<Bust> bust_;
 };
 
@@ -196,7 +198,8 @@ void FaceJob::MakeSubjectsFace() {
   seedable_ = SeedableFace(experiment_, skull_->cuts, skull_->implicit.dense, subject_);
   made_ = step_("fit", [&] {
     return MakeFace(
-        {experiment_, *generic_, prior_.get(), subject_, seedable_, skull_->depth_stage->shell},
+        {experiment_, *generic_, prior_.get(), subject_, seedable_, skull_->depth_stage->shell,
+         skull_->field.get()},
         context_);
   });
   NoteFace(experiment_, prior_.get(), subject_);
@@ -243,6 +246,22 @@ void FaceJob::MeasureFace() {
   });
 }
 
+void FaceJob::Judge() {
+  plausibility_ = step_("judge", [&] {
+    return JudgeFace({.surface = surface(),
+                      .face = face_,
+                      .generic = Transformed(generic_->surface, made_->placed.face_from_template),
+                      .skull = subject_.skull,
+                      .origin = subject_.origin,
+                      .shell = skull_->depth_stage->shell,
+                      .dowels = subject_.dowels_on_bone,
+                      .pose = subject_.basis.sites,
+                      .target = made_->fitted.target,
+                      .fit = made_->fitted.fit},
+                     experiment_.plausibility, context_);
+  });
+}
+
 void FaceJob::PutFaceOnBust() {
   if (bust_model_ == nullptr) {
     return;
@@ -272,6 +291,7 @@ RunResult FaceJob::TakeResult() {
           .uncertainty = std::move(uncertainty_),
           .truth = std::move(truth_),
           .features = std::move(features),
+          .plausibility = std::move(plausibility_),
           .bust_model = std::move(bust_model_),
           .bust = std::move(bust_),
           .times = step_.Take()};
@@ -301,6 +321,7 @@ std::vector<std::string> RunResult::Faults() const {
     require(truth->face, "H-spline face");
     require(truth->implicit, "implicit face");
   }
+  std::ranges::move(plausibility.Faults(), std::back_inserter(faults));
   return faults;
 }
 
@@ -316,6 +337,7 @@ RunResult Run(const Experiment& experiment, const RunContext& context, StageCach
   job.TessellateFace();
   job.EstimateUncertainty();
   job.MeasureFace();
+  job.Judge();
   job.PutFaceOnBust();
   return job.TakeResult();
 }

@@ -10,6 +10,7 @@
 #include "problems/experiment/case.h"
 #include "problems/experiment/depth_comparison.h"
 #include "problems/experiment/metrics/face_details.h"
+#include "problems/experiment/plausibility.h"
 #include "problems/experiment/skull_stage.h"
 #include "problems/experiment/uncertainty.h"
 #include "problems/face/bust/pose_bust.h"
@@ -51,13 +52,14 @@ struct RunResult {
   std::optional<FaceUncertainty> uncertainty;
   std::optional<TruthComparison> truth;  // if the true skin is known
   std::vector<FeatureDistortion> features;
+  Plausibility plausibility;
   std::shared_ptr<const BustModel> bust_model;  // null: no bust
   std::optional<Bust> bust;                     // of bust_model
   std::vector<StepTime> times;  // not reproducible, so kept apart from other results
 
   // Notes for readers, one line each: on the subject and its face, then on the implicit face.
   std::vector<std::string> Notes() const;
-  // The reasons why the face cannot be used. Empty if it can.
+  // The reasons why the face cannot be used, those of `plausibility` included. Empty if it can.
   std::vector<std::string> Faults() const;
   bool usable() const { return Faults().empty(); }
 };

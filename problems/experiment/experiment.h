@@ -19,6 +19,7 @@
 #include "interp/schemes/outside_rule.h"
 #include "problems/config/config_tree.h"
 #include "problems/experiment/metrics/face_region.h"
+#include "problems/experiment/plausibility.h"
 #include "problems/face/bust/bust_model.h"
 #include "problems/face/face_source.h"
 #include "problems/face/feature_rules.h"
@@ -254,6 +255,7 @@ struct Experiment {
   std::filesystem::path edits;
   UncertaintyOptions uncertainty;
   FaceRegionOptions region;
+  PlausibilityLimits plausibility;
   DepthDirection direction;
   DepthTruthOptions depth_truth;
   CrossValidationOptions cross_validation;
@@ -339,6 +341,9 @@ void Fields(Visitor& visit, Experiment& o) {
   visit(FieldInfo{.name = "uncertainty", .doc = "uncertainty of the face and its sources"},
         o.uncertainty);
   visit(FieldInfo{.name = "region", .doc = "which part of the true skin is scored"}, o.region);
+  visit(FieldInfo{.name = "plausibility",
+                  .doc = "limits beyond which a face is not usable (exit code 1)"},
+        o.plausibility);
   visit(FieldInfo{.name = "direction",
                   .doc = "direction of a depth where it is compared with the true one; the depth "
                          "ends at p + depth * direction"},

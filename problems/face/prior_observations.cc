@@ -19,25 +19,31 @@
 namespace semblance::problems {
 namespace {
 
-// The deviations (sd) of configs/tables/t_table_2023.yaml.
-const std::map<std::string, double, std::less<>>& TTableSd_mm() {
-  static const std::map<std::string, double, std::less<>> sd_mm = {
-      {"g", 1},  {"n", 1.5},  {"rhi", 1},   {"mp", 2.5}, {"pr", 3},  {"id", 3},
-      {"sm", 2}, {"pg", 2.5}, {"me", 2.5},  {"mso", 2},  {"mio", 3}, {"zy", 3},
-      {"go", 6}, {"sM2", 7},  {"iM2", 6.5}, {"mr", 5}};
-  return sd_mm;
+// The means and deviations of configs/tables/t_table_2023.yaml, of the standard sites.
+const std::map<std::string, PublishedDepth, std::less<>>& TTable() {
+  static const std::map<std::string, PublishedDepth, std::less<>> table = {
+      {"g", {5.5, 1}},   {"n", {6, 1.5}},   {"rhi", {3, 1}},    {"mp", {11.5, 2.5}},
+      {"pr", {12, 3}},   {"id", {13.5, 3}}, {"sm", {11, 2}},    {"pg", {11, 2.5}},
+      {"me", {7, 2.5}},  {"mso", {7, 2}},   {"mio", {6.5, 3}},  {"zy", {7.5, 3}},
+      {"go", {12.5, 6}}, {"sM2", {26, 7}},  {"iM2", {22, 6.5}}, {"mr", {19.5, 5}}};
+  return table;
 }
 
 constexpr double kMeanShareOfDepth = 0.29;  // mean of sd / depth over the sites of that table
 
 }  // namespace
 
+std::optional<PublishedDepth> FindPublishedDepth(std::string_view site) {
+  const auto found = TTable().find(WithoutSide(site));
+  return found != TTable().end() ? std::optional(found->second) : std::nullopt;
+}
+
 double PublishedSd_mm(const Dowel& dowel) {
   if (std::isfinite(dowel.sd_mm)) {
     return dowel.sd_mm;
   }
-  const auto found = TTableSd_mm().find(WithoutSide(dowel.site));
-  return found != TTableSd_mm().end() ? found->second : kMeanShareOfDepth * dowel.depth_mm;
+  const std::optional<PublishedDepth> published = FindPublishedDepth(dowel.site);
+  return published ? published->sd_mm : kMeanShareOfDepth * dowel.depth_mm;
 }
 
 double DepthSd_mm(const TableDepthOptions& options, const Dowel& dowel) {

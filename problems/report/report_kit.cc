@@ -196,12 +196,15 @@ std::string TilesHtml(const std::vector<ReportTile>& tiles) {
   return html + "</dl>\n";
 }
 
-std::string NotesHtml(const std::vector<std::string>& notes) {
-  if (notes.empty()) {
+std::string NotesHtml(const Report& report) {
+  if (report.faults.empty() && report.notes.empty()) {
     return {};
   }
   std::string html = "<section class=\"notes\">\n<h2 id=\"notes\">Notes</h2>\n";
-  for (const std::string& note : notes) {
+  for (const std::string& fault : report.faults) {
+    html += fmt::format("<p class=\"fault\">The result is not usable: {}</p>\n", EscapeHtml(fault));
+  }
+  for (const std::string& note : report.notes) {
     html += fmt::format("<p>{}</p>\n", EscapeHtml(note));
   }
   return html + "</section>\n";
@@ -223,7 +226,7 @@ std::string ScoreHtml(const Report& report) {
 // The ids and headings of the page's sections, in order.
 std::vector<std::pair<std::string, std::string>> Headings(const Report& report) {
   std::vector<std::pair<std::string, std::string>> headings;
-  if (!report.notes.empty()) {
+  if (!report.faults.empty() || !report.notes.empty()) {
     headings.emplace_back("notes", "Notes");
   }
   if (!report.scenes.empty()) {
@@ -361,14 +364,6 @@ ReportImage SubjectBoxPlot(const std::vector<BoxRow>& rows, const std::string& a
           .alt = std::move(alt)};
 }
 
-std::vector<std::string> FaultNotes(const std::vector<std::string>& faults) {
-  std::vector<std::string> notes;
-  for (const std::string& fault : faults) {
-    notes.push_back("The result is not usable: " + fault);
-  }
-  return notes;
-}
-
 std::string ReportHtml(const Report& report) {
   std::string html = fmt::format(
       "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
@@ -380,7 +375,7 @@ std::string ReportHtml(const Report& report) {
   if (!report.subtitle.empty()) {
     html += fmt::format("<p class=\"subtitle\">{}</p>\n", EscapeHtml(report.subtitle));
   }
-  html += "</header>\n" + NavigationHtml(report) + "<main>\n" + NotesHtml(report.notes) +
+  html += "</header>\n" + NavigationHtml(report) + "<main>\n" + NotesHtml(report) +
           ViewHtml(report.scenes, report.scenes_note);
   for (const ReportImage& image : report.main_images) {
     html += ImageHtml(image);

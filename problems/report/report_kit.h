@@ -77,9 +77,10 @@ struct ReportSection {
 struct Report {
   std::string title;
   std::string subtitle;
-  std::vector<std::string> notes = {};  // warnings that a reader needs first
-  std::string scenes = {};              // CollectScenes (scene_json.h) for the 3-D view, or empty
-  std::string scenes_note = {};         // below the 3-D view; may be empty
+  std::vector<std::string> faults = {};  // why the result is not usable; in red above the notes
+  std::vector<std::string> notes = {};   // warnings that a reader needs first
+  std::string scenes = {};               // CollectScenes (scene_json.h) for the 3-D view, or empty
+  std::string scenes_note = {};          // below the 3-D view; may be empty
   std::vector<ReportImage> main_images = {};  // the first pictures, usually one
   std::string score_heading = "In figures";
   std::vector<ReportTile> tiles = {};          // the key numbers
@@ -87,9 +88,6 @@ struct Report {
   std::vector<ReportSection> sections = {};
   std::string footer = {};  // after the program's version; no time, so the bytes stay the same
 };
-
-// One note for each reason why a result is not usable.
-std::vector<std::string> FaultNotes(const std::vector<std::string>& faults);
 
 // Returns an HTML5 page that contains its pictures. The same report gives the same bytes. Columns
 // of numbers are aligned right, an empty cell shows a dash, and a table of more than 12 rows gets a

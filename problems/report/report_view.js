@@ -33,6 +33,7 @@
   }
 
   const stages = [];
+  let measure = null;
   const pace = new SemblancePace(() => stages, () => drawCompass());
   const drawSoon = shared.drawSoon = () => pace.soon();
   const updateAll = () => {
@@ -74,7 +75,9 @@
     const show = () => {
       const scene = scenes[Number(choice.value)];
       facts.textContent = scene.facts.join(' \u00b7 ');
+      facts.classList.toggle('fault', (scene.faults || []).length > 0);
       stage.show(scene, blobs);
+      if (measure) { measure.markFaults(stage, scene.faults || []); }
       showDifference();
     };
     choice.addEventListener('change', show);
@@ -184,7 +187,8 @@
       show();
       shared.camera.attach(canvas, {wheel: 'asked'});
     }
-    const measure = new SemblanceMeasure(stages, drawSoon, box);
+    measure = new SemblanceMeasure(stages, drawSoon, box);
+    for (const stage of stages) { measure.markFaults(stage, stage.description.faults || []); }
     panel.insertBefore(group('Measure', ...measure.controls(root)), legends);
     drawLegends();
     shared.camera.look(35, scenes[0].axes ? 35 : 8);

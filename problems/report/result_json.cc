@@ -372,7 +372,8 @@ Json ResultJson(const Experiment& experiment, const RunResult& result) {
   Json json = {{"title", experiment.title},
                {"subject", result.subject.name},
                {"usable", result.usable()},
-               {"faults", result.Faults()}};
+               {"faults", result.Faults()},
+               {"plausibility", PlausibilityToJson(result.plausibility)}};
   json["face"] = result.truth
                      ? ScoreToJson(result.truth->face, result.truth->details, result.truth->skin)
                      : Json(nullptr);

@@ -406,13 +406,17 @@ ReportSection RulesSection(const Json& rules) {
   return section;
 }
 
-// The faults of the result, then its notes.
-std::vector<std::string> RunNotes(const Json& result) {
-  std::vector<std::string> notes = FaultNotes(result.value("faults", std::vector<std::string>()));
-  for (const Json& note : result.at("notes")) {
-    notes.push_back(note.get<std::string>());
+// The checks of the face against their limits. Empty for folders of older versions.
+ReportTable PlausibilityTable(const Json& result) {
+  ReportTable table{"The face against the limits of a plausible face (options: plausibility)",
+                    {"check", "value", "limit", "unit", "passed", "finding"}};
+  const Json checks = result.value("plausibility", Json::object());
+  for (const auto& [name, check] : checks.items()) {
+    table.AddRow(WordsOfKey(name), Number(check.at("value"), 3), Number(check.at("limit"), 3),
+                 Number(check.at("unit")), Number(check.at("passed")),
+                 Number(check.at("sentence")));
   }
-  return notes;
+  return table;
 }
 
 ReportSection FitSection(const Json& fit) {
@@ -442,6 +446,9 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
     const std::filesystem::path alternatives = folder.Root() / "alternatives.json";
     sections.push_back(
         AlternativesSection(ParseJson(ReadFileBytes(alternatives), alternatives.string()), folder));
+  }
+  if (ReportTable checks = PlausibilityTable(result); !checks.rows.empty()) {
+    sections.push_back({.heading = "Plausibility", .tables = {std::move(checks)}, .folded = true});
   }
   sections.push_back(PictureSection(folder));
   if (IsPartlyInvented(result)) {
@@ -498,7 +505,8 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
   report.title = result.at("title").get<std::string>();
   report.subtitle = "Facial approximation of " + result.at("subject").get<std::string>() +
                     ". An approximation, not an identification.";
-  report.notes = RunNotes(result);
+  report.faults = result.value("faults", std::vector<std::string>());
+  report.notes = result.at("notes").get<std::vector<std::string>>();
   report.tiles = Tiles(result);
   report.score_heading = result.at("face").is_null() ? "In figures" : "Score";
   report.score_images = ScoreImages(result.at("face"), folder);

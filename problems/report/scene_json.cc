@@ -10,6 +10,7 @@
 #include <map>
 #include <utility>
 
+#include "problems/config/terminal_text.h"
 #include "problems/report/plain_names.h"
 #include "problems/report/run_pictures.h"
 #include "problems/report/view/view_mesh.h"
@@ -83,8 +84,9 @@ class SceneWriter {
     for (int level = 0; level <= result_.fit.surface.shape().max_level; ++level) {
       Net(level);
     }
-    const Json scene = {{"label", result_.subject.name},
+    const Json scene = {{"label", PlainText(result_.subject.name)},
                         {"facts", Facts()},
+                        {"faults", FaultMarks(PlausibilityToJson(result_.plausibility))},
                         {"maps", Maps()},
                         {"layers", layers_},
                         {"blobs", blobs_.All()}};
@@ -225,6 +227,9 @@ class SceneWriter {
 
   Json Facts() const {
     Json facts = Json::array();
+    if (!result_.usable()) {
+      facts.push_back("not usable");
+    }
     if (result_.truth) {
       const DistanceSummary& s = result_.truth->face.truth_to_face;
       facts.push_back(fmt::format("mean error {:.2f} mm", s.mean_abs_mm));

@@ -10,13 +10,13 @@
 
 namespace semblance::problems {
 
-// {label, facts, maps, layers, blobs} of one run. Layers from inner to outer: skull, dowels (base,
-// tip, the fitted face's point, depth and residual), depth on the skull's shell, first and
-// recovered face with their signed error if the truth is known, head, uncertainty, true skin, and
-// one control net per level. Meshes are reduced to tens of thousands of triangles, points are
-// rounded to 1/65535 of the longest side (about 5 um) and values to 0.01 mm (view_mesh.h). A blob
-// is named by the hash of its content, so scenes can share the bytes of one skull. The same run
-// gives the same text.
+// {label, facts, faults, maps, layers, blobs} of one run. Faults are FaultMarks of the face. Layers
+// from inner to outer: skull, dowels (base, tip, the fitted face's point, depth and residual),
+// depth on the skull's shell, first and recovered face with their signed error if the truth is
+// known, head, uncertainty, true skin, and one control net per level. Meshes are reduced to tens of
+// thousands of triangles, points are rounded to 1/65535 of the longest side (about 5 um) and values
+// to 0.01 mm (view_mesh.h). A blob is named by the hash of its content, so scenes can share the
+// bytes of one skull. The same run gives the same text.
 std::string SceneJson(const RunResult& result, const RunContext& context);
 
 // Several scenes as one {scenes, blobs}, with each blob once. The label of a scene is its entry in

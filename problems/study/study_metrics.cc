@@ -101,6 +101,7 @@ RunResult EmptyRun() {
                    .uncertainty = FaceUncertainty{},
                    .truth = TruthComparison{},
                    .features = {},
+                   .plausibility = {},
                    .bust_model = nullptr,
                    .bust = Bust{},
                    .times = {}};

@@ -52,7 +52,7 @@ export function comparePanel({scene}) {
     const {variants, middle} = SETS[chosen];
     const reference = SemblanceGeometry.geometryOf(faces[variants.indexOf(middle)].mesh);
     scene.compare(variants.map((name, k) => ({
-      title: TITLES[name], face: faces[k].mesh, dowels: faces[k].dowels, former: name === middle ? null : reference})), {coloured: colour.checked, caption});
+      title: TITLES[name] + ((faces[k].faults || []).length ? ' (not usable)' : ''), face: faces[k].mesh, dowels: faces[k].dowels, former: name === middle ? null : reference})), {coloured: colour.checked, caption});
   };
 
   const draw = async () => {

@@ -63,7 +63,7 @@ export function facePanel({faces, scene}) {
         .flatMap(([key, schema]) => tree(key, schema, store.state.values[key], matches, words !== '')));
   };
   const drawFace = () => {
-    line.replaceChildren(stateLine(faces));
+    line.replaceChildren(stateLine(faces), lines(faces.faults.map(({fault}) => `Not usable: ${fault}`), 'bad') || '');
     save.hidden = faces.kind !== 'full';
     notes.replaceChildren(faces.notes.length ? element('details', {}, element('summary', {textContent: `Notes (${faces.notes.length})`}),
                                                        lines(faces.notes, 'soft')) : '');

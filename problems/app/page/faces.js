@@ -10,6 +10,7 @@ export class Faces {
     this.kind = 'none';      // none, coarse, full
     this.words = '';         // reason if there is no face
     this.notes = [];
+    this.faults = [];        // of a full face: [{text, fault, place}]
     this.dowels = [];
     this.kept = null;        // the geometry of the last state; trials do not change it
     this.former = null;      // the geometry that changes are measured from
@@ -60,6 +61,7 @@ export class Faces {
     this.kind = kind;
     this.words = '';
     this.notes = face.notes;
+    this.faults = face.faults || [];
     this.dowels = face.dowels.length ? face.dowels : this.dowels;
     this.seconds = face.seconds;
     this.finest = face.finest_level;
@@ -67,6 +69,7 @@ export class Faces {
     this.scene.put('face', face.mesh);
     if (!trial) { this.kept = this.scene.faceGeometry().clone(); }
     this.scene.putDowels(this.dowels);
+    this.scene.putFaults(this.faults);
     this.recolour();
     this.notify();
   }
@@ -75,8 +78,10 @@ export class Faces {
     this.kind = 'none';
     this.words = words;
     this.notes = [];
+    this.faults = [];
     this.scene.put('face', null);
     this.scene.putDowels([]);
+    this.scene.putFaults([]);
     this.notify();
   }
 

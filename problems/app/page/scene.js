@@ -99,6 +99,9 @@ export class Scene {
     frame.stage.update();
   }
 
+  // Marks the faults of the face in red, [{text, fault, place}].
+  putFaults(faults) { if (this.measure) { this.measure.markFaults(this.main.stage, faults); } }
+
   // Colours the face by its distance outside `former`, a face with the same vertices.
   colourChange(former, frame = this.main) {
     const face = frame.stage.layers.get('face');

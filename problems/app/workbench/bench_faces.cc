@@ -62,13 +62,13 @@ SubjectData DecimatedSubject(const BenchSubject& subject, const BenchState& stat
 }
 
 struct VariantFiles {
-  fs::path face, key;
+  fs::path face, faults, key;
 };
 
 VariantFiles FindVariantFiles(const fs::path& folder, BenchVariant variant) {
   const std::string name(VariantName(variant));
   return {folder / "variants" / (name + ".hspline.json"),
-          folder / "variants" / (name + ".key.txt")};
+          folder / "variants" / (name + ".faults.json"), folder / "variants" / (name + ".key.txt")};
 }
 
 }  // namespace
@@ -150,6 +150,7 @@ void StoreVariant(const fs::path& folder, BenchVariant variant, const VariantFac
   MakeFolderBelow(folder, "variants");
   fs::remove(files.key);  // without a key, an incomplete face is never read
   WriteHSpline(files.face, made.face.surface);
+  WriteFileAtomically(files.faults, made.face.faults);
   WriteFileAtomically(files.key, made.key);
 }
 
@@ -158,9 +159,13 @@ VariantFaces StoredVariants(const fs::path& folder, const std::string& key,
   VariantFaces found;
   for (const BenchVariant variant : kBenchVariants) {
     const VariantFiles files = FindVariantFiles(folder, variant);
-    if (fs::exists(files.key) && fs::exists(files.face) && ReadFileBytes(files.key) == key) {
-      found.emplace(variant,
-                    VariantFace{{ReadHSpline(files.face), dowels(variant), /*notes=*/{}}, key});
+    if (fs::exists(files.key) && fs::exists(files.face) && fs::exists(files.faults) &&
+        ReadFileBytes(files.key) == key) {
+      found.emplace(variant, VariantFace{{.surface = ReadHSpline(files.face),
+                                          .dowels = dowels(variant),
+                                          .notes = {},
+                                          .faults = ReadFileBytes(files.faults)},
+                                         key});
     }
   }
   return found;

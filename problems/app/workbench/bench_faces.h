@@ -23,7 +23,8 @@ struct BenchFace {
   HSplineSurface surface;
   std::vector<Dowel> dowels;
   std::vector<std::string> notes;
-  double seconds = kNaN;  // duration of making a coarse face; NaN for a full one
+  std::string faults = "[]";  // FaultMarks of a full face as JSON; a coarse face is not judged
+  double seconds = kNaN;      // duration of making a coarse face; NaN for a full one
 };
 
 // The case as a run makes it, but on the decimated skull: dowels with their depths, and notes. The
@@ -69,7 +70,7 @@ struct VariantFace {
 };
 using VariantFaces = std::map<BenchVariant, VariantFace>;
 
-// Writes the variant's surface and key to FOLDER/variants. Throws IoError.
+// Writes the variant's surface, faults and key to FOLDER/variants. Throws IoError.
 void StoreVariant(const std::filesystem::path& folder, BenchVariant variant,
                   const VariantFace& made);
 

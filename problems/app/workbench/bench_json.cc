@@ -151,6 +151,7 @@ std::string FaceJson(const BenchFace& face) {
   return Json{{"mesh", EncodeMeshBlob(Tessellate(face.surface, kShownQuadsPerPatch).mesh)},
               {"dowels", DowelsJson(face.dowels)},
               {"notes", face.notes},
+              {"faults", Json::parse(face.faults, nullptr, /*allow_exceptions=*/false)},
               {"finest_level", face.surface.shape().max_level},
               {"seconds", face.seconds}}
       .dump(-1, ' ', false, Json::error_handler_t::replace);

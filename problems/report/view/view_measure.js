@@ -238,9 +238,19 @@ class SemblanceMeasure {
     this.mark(stage, hit.point, text, []);
   }
 
-  mark(stage, point, text, way) {
-    const group = new THREE.Group(), radius = 0.004 * this.box.getSize(new THREE.Vector3()).length();
-    const material = new THREE.MeshBasicMaterial({color: 0x0b5c8f, depthTest: false});
+  // Marks the faults of a face, [{text, fault, place}], in red, in place of those of the face before.
+  markFaults(stage, faults) {
+    for (const mark of this.marks.filter((other) => other.stage === stage && other.fault)) { this.remove(mark); }
+    for (const {text, fault, place} of faults) {
+      if (place) { this.mark(stage, new THREE.Vector3(...place), text, [], fault); }
+    }
+    this.setStatus('');
+  }
+
+  // fault: the whole fault if the mark shows one, otherwise empty.
+  mark(stage, point, text, way, fault = '') {
+    const group = new THREE.Group(), radius = (fault ? 0.008 : 0.004) * this.box.getSize(new THREE.Vector3()).length();
+    const material = new THREE.MeshBasicMaterial({color: fault ? 0xd00000 : 0x0b5c8f, depthTest: false});
     for (const end of way.length ? [way[0], way[way.length - 1]] : [point]) {
       const ball = new THREE.Mesh(new THREE.SphereBufferGeometry(radius, 12, 8), material);
       ball.position.copy(end);
@@ -252,11 +262,12 @@ class SemblanceMeasure {
     }
     group.renderOrder = 1000;
     const label = document.createElement('div');
-    label.className = 'view3d-label';
+    label.className = fault ? 'view3d-label fault' : 'view3d-label';
+    label.title = fault;
     const close = Object.assign(document.createElement('button'), {type: 'button', textContent: '\u00d7'});
     close.setAttribute('aria-label', `remove ${text}`);
     label.append(text, close);
-    const made = {stage, point: point.clone(), group, label, text};
+    const made = {stage, point: point.clone(), group, label, text, fault};
     close.addEventListener('click', () => this.remove(made));
     stage.extra.add(group);
     stage.overlay.append(label);

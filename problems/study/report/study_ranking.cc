@@ -75,10 +75,11 @@ std::string RankingText(const StudyResults& results) {
   for (std::size_t n = 0; n < std::min(ranked.size(), kLines); ++n) {
     const double seconds = MeanSeconds(results, ranked[n]);
     const auto subjects = static_cast<long long>(ranked[n].by_subject.size());
-    text += fmt::format("{:>4}  {:>10.4g}  {}{}  {}\n", n + 1, MeanOverSubjects(ranked[n]),
-                        Counted(subjects, "subject"),
-                        std::isfinite(seconds) ? fmt::format(", {:.1f} s", seconds) : "",
-                        ranked[n].label);
+    text += fmt::format(
+        "{:>4}  {:>10.4g}  {}{}{}  {}\n", n + 1, MeanOverSubjects(ranked[n]),
+        Counted(subjects, "subject"),
+        ranked[n].unusable > 0 ? fmt::format(", {} not usable", ranked[n].unusable) : "",
+        std::isfinite(seconds) ? fmt::format(", {:.1f} s", seconds) : "", ranked[n].label);
   }
   if (ranked.size() > kLines) {
     text += fmt::format("      and {} more in summary.csv\n", ranked.size() - kLines);

@@ -89,13 +89,14 @@ addEventListener('load', () => setTimeout(() => {
 }, 500));
 </script>)js";
 
-RunResult SmallRun(int random_seed) {
+RunResult SmallRun(int random_seed, const std::string& override = "rounds=1") {
   const std::vector<std::string> overrides = {fmt::format("subject.random_seed={}", random_seed),
                                               "subject.rings=40",
                                               "implicit.resolution=30",
                                               "seeds.level=0",
                                               "template.max_level=1",
-                                              "fit.plan.schedule=[{level: 0, fraction: 1}]"};
+                                              "fit.plan.schedule=[{level: 0, fraction: 1}]",
+                                              override};
   const auto experiment =
       ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides);
   return Run(experiment, {});
@@ -166,6 +167,39 @@ TEST_F(ReportViewTest, RendersTogglesLinksAndSortsWithoutAFault) {
   EXPECT_EQ(out["apart"], 0);  // the same scene twice, one camera
   EXPECT_EQ(out["up"], nlohmann::json({"9.5", "10", "–"}));
   EXPECT_EQ(out["down"], nlohmann::json({"10", "9.5", "–"}));
+}
+
+constexpr const char* kCountMarks = R"js(<script>
+addEventListener('load', () => setTimeout(() => {
+  const canvas = document.querySelector('.view3d-stage canvas'), copy = document.createElement('canvas');
+  Object.assign(copy, {width: canvas.width, height: canvas.height});
+  const pen = copy.getContext('2d');
+  pen.drawImage(canvas, 0, 0);
+  const data = pen.getImageData(0, 0, copy.width, copy.height).data;
+  let red = 0;
+  for (let k = 0; k < data.length; k += 4) { red += data[k] > 190 && data[k + 1] < 20 && data[k + 2] < 20; }
+  const out = {red, faults, labels: [...document.querySelectorAll('.view3d-label.fault')].map((label) => label.title),
+               notes: [...document.querySelectorAll('.notes .fault')].map((note) => note.textContent),
+               facts: document.querySelector('.view3d-facts.fault')?.textContent || ''};
+  document.body.insertAdjacentHTML('beforeend', '<pre id="outcome">' + JSON.stringify(out) + '</pre>');
+}, 1000));
+</script>)js";
+
+TEST_F(ReportViewTest, MarksFaultsInRedAtTheirPlaces) {
+  const RunResult run = SmallRun(1, "plausibility.direction_deg=0.001");
+  ASSERT_EQ(run.Faults().size(), 1u);
+  Report report;
+  report.title = "t";
+  report.faults = run.Faults();
+  report.scenes = CollectScenes({{"one", SceneJson(run, {})}}, 1 << 30).json;
+  std::string html = ReportHtml(report);
+  html.insert(html.find("<head>") + 6, kListen);
+  const nlohmann::json out = Outcome(html + kCountMarks, "1400,1200");
+  EXPECT_EQ(out["faults"], nlohmann::json::array());
+  EXPECT_EQ(out["labels"], nlohmann::json(run.Faults()));
+  EXPECT_EQ(out["notes"], nlohmann::json({"The result is not usable: " + run.Faults()[0]}));
+  EXPECT_THAT(out["facts"].get<std::string>(), ::testing::StartsWith("not usable"));
+  EXPECT_GT(out["red"], 30);
 }
 
 // A phone: 400 pixels. Tables of many columns are cards, contents and folded parts open on demand.

@@ -80,6 +80,18 @@ TEST(StudyComparison, TheDifferenceIsAMeanOverCommonSubjects) {
               Contains(HasSubstr("a: left out because not all studies have them: 2 subjects")));
 }
 
+TEST(StudyComparison, UnusableTrialsAreNotComparedAndAreCounted) {
+  const NamedStudy a = Study("a", {"x"}, 8, 1);
+  NamedStudy b = Study("b", {"x"}, 8, 2);
+  b.results.trials[3].status = "unusable";
+  b.results.trials[3].metrics[kMetric] = 0;
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
+  EXPECT_THAT(comparison.subjects, SizeIs(7));
+  EXPECT_EQ(comparison.pairs[0].difference.n, 7);
+  EXPECT_THAT(comparison.notes, Contains(HasSubstr("b: 1 of 8 trials not usable and left out")));
+  EXPECT_THAT(comparison.notes, Not(Contains(HasSubstr("not finished"))));
+}
+
 TEST(StudyComparison, ACopyDoesNotDifferAndSwappingTurnsTheSign) {
   const NamedStudy a = Study("a", {"x", "y"}, 8, 1), b = Study("b", {"x", "y"}, 8, 2);
   NamedStudy copy = a;

@@ -6,6 +6,7 @@
 #include <sqlite3.h>
 
 #include <cmath>
+#include <sstream>
 #include <tuple>
 
 #include "problems/study/report/results_sqlite.h"
@@ -59,6 +60,31 @@ TEST(StudyRanking, TheBestMeanComesFirst) {
   StudyResults none = Results();
   none.metric = "another";
   EXPECT_EQ(RankingText(none), "");
+}
+
+// An unusable trial has the best value by far. No number changes because of it, and all tables
+// count it.
+TEST(StudyRanking, UnusableTrialsAreLeftOutAndCounted) {
+  StudyResults results = Results();
+  results.trials.push_back(Trial("s3", "a", "1", 0.001, 1));
+  results.trials.back().status = "unusable";
+  results.trials.back().reason = "the face is 28000 mm wide";
+  EXPECT_THAT(RankingText(results), HasSubstr("   1         1.5  2 subjects  b, 1\n"));
+  EXPECT_THAT(RankingText(results),
+              HasSubstr("           4  2 subjects, 1 not usable, 2.0 s  a, 1\n"));
+  EXPECT_EQ(UnusableText(Results()), "");
+  EXPECT_EQ(
+      UnusableText(results),
+      "1 of 9 trials not usable and left out of rankings, means and tests: a, 1 (1). The table "
+      "of trials has the reasons");
+  EXPECT_THAT(SummaryCsv(results), HasSubstr("a,1,face.rms_mm,2,4,"));
+  EXPECT_THAT(SummaryCsv(results), HasSubstr("mean_high_95,unusable\n"));
+  std::istringstream lines(SummaryCsv(results));
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with("a,1,") || line.starts_with("b,1,")) {
+      EXPECT_THAT(line, ::testing::EndsWith(line.starts_with("a") ? ",1" : ",0"));
+    }
+  }
 }
 
 TEST(StudyRanking, ALongRankingIsCutAndCounted) {
