@@ -65,8 +65,8 @@ test: build
 	@ctest --preset $(PRESET) -j "$$(nproc)"
 
 # Hostile calls, injected faults, pairs of options, fuzzing. ONLY selects some of: attack faults pairwise fuzz (docs/explanation/reliability.md).
-# SEED, COUNT, PAIRS, SHARE and MINUTES set how much of each.
-export SEED COUNT PAIRS SHARE MINUTES JOBS
+# SEED, LAWS, COUNT, PAIRS, SHARE and MINUTES set how much of each.
+export SEED LAWS COUNT PAIRS SHARE MINUTES JOBS
 harness: build
 	@tests/harness/harness.sh $(PROGRAM) configs $(ONLY)
 

@@ -2,8 +2,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The four harnesses: hostile calls (attack), injected faults (faults), coverage-guided fuzzing (fuzz) and all pairs of options (pairwise).
 # usage: harness.sh PROGRAM CONFIGS [HARNESS...]   default: attack faults pairwise, and fuzz if clang has its runtime
-# Environment: SEED (1) of attack and faults; COUNT (100) kills of faults; PAIRS, or SHARE seconds of CPU time, of pairwise;
-# MINUTES (10) per fuzzer and JOBS at a time.
+# Environment: SEED (1) of attack and faults; LAWS (1000) cases of attack whose right result is known;
+# COUNT (100) kills of faults; PAIRS, or SHARE seconds of CPU time, of pairwise; MINUTES (10) per fuzzer and JOBS at a time.
 set -u
 here=$(dirname "$(realpath "$0")")
 program=$1 configs=$2
@@ -15,7 +15,7 @@ can_fuzz() {
     clang++ -x c++ -fsanitize=fuzzer,address - -o /dev/null 2> /dev/null
 }
 
-attack() { python3 -B "$here/attack.py" "$program" "$configs" --seed "${SEED:-1}" --jobs "$jobs"; }
+attack() { python3 -B "$here/attack.py" "$program" "$configs" --seed "${SEED:-1}" --laws "${LAWS:-1000}" --jobs "$jobs"; }
 faults() { "$here/faults.sh" "$program" "$configs" "${COUNT:-100}"; }
 
 pairwise() {

@@ -568,34 +568,37 @@ def with_place(row, place):
     return (*place, *row[3:])
 
 
+def fit_form(points, draw):
+    """One form of the same points: its name, its rows, and the way back to the plain points."""
+    rows, count = points.rows, len(points.rows)
+    factor, matrix = 10 ** draw.uniform(-2, 2), rotation(any_direction(draw), draw.uniform(0, 180))
+    shift = [draw.choice([10, 1e3, 1e5]) * draw.uniform(-1, 1) for _ in range(3)]
+    near, far = 10 ** draw.uniform(-9, -1), draw.choice([3, 10, 100])
+    twin = lambda r: with_place(r, [c + near * draw.uniform(-1, 1) for c in r[:3]])
+    single = lambda r: with_place(r, [struct.unpack("f", struct.pack("f", c))[0] for c in r[:3]])
+    stray = lambda: with_place(rows[0], [30 + 60 * far * draw.choice([-1, 1]), 30 + 60 * far * draw.uniform(-1, 1), 60 * far * draw.uniform(-1, 1)])
+    stay, mirror = lambda p: p, lambda p: (60 - p[0], p[1], p[2])
+    return draw.choice([
+        lambda: ("permuted", draw.sample(rows, count), stay),
+        lambda: ("mirrored", [with_place(r, mirror(r)) for r in rows], mirror),
+        lambda: ("u and v exchanged", [(*r[:3], r[4], r[3]) for r in rows], stay),
+        lambda: (f"times {factor:.3g}", [with_place(r, [factor * c for c in r[:3]]) for r in rows], lambda p: tuple(c / factor for c in p)),
+        lambda: (f"shifted by {math.hypot(*shift):.3g}", [with_place(r, [a + b for a, b in zip(r, shift)]) for r in rows],
+                 lambda p: tuple(a - b for a, b in zip(p, shift))),
+        lambda: ("rotated", [with_place(r, apply(matrix, r[:3])) for r in rows], lambda p: apply(transposed(matrix), p)),
+        lambda: (f"twins within {near:.1g}", rows + [twin(r) for r in draw.sample(rows, count // draw.choice([1, 2, 5]))], stay),
+        lambda: ("twins in single precision", rows + list(map(single, rows)), stay),
+        lambda: ("copies", rows + draw.sample(rows, count // 2), stay),
+        lambda: (f"a stray point {far} extents away", rows + [stray()], stay),
+    ])()
+
+
 def fit_laws(world):
     draw = world.draw("fit")
     while True:
         k = draw.randrange(len(world.points))
-        points = world.points[k]
-        rows, count = points.rows, len(points.rows)
-        factor, matrix = 10 ** draw.uniform(-2, 2), rotation(any_direction(draw), draw.uniform(0, 180))
-        shift = [draw.choice([10, 1e3, 1e5]) * draw.uniform(-1, 1) for _ in range(3)]
-        near = 10 ** draw.uniform(-9, -1)
-        twins = [with_place(r, [c + near * draw.uniform(-1, 1) for c in r[:3]]) for r in draw.sample(rows, count // draw.choice([1, 2, 5]))]
-        single = [(*(struct.unpack("f", struct.pack("f", c))[0] for c in r[:3]), *r[3:]) for r in rows]
-        far = draw.choice([3, 10, 100])
-        stray = with_place(rows[0], [30 + 60 * far * draw.choice([-1, 1]), 30 + 60 * far * draw.uniform(-1, 1), 60 * far * draw.uniform(-1, 1)])
-        mirror = lambda r: with_place(r, (60 - r[0], r[1], r[2]))
-        what, changed, back = draw.choice([
-            lambda: ("permuted", draw.sample(rows, count), None),
-            lambda: ("mirrored", list(map(mirror, rows)), lambda p: (60 - p[0], p[1], p[2])),
-            lambda: ("u and v exchanged", [(*r[:3], r[4], r[3]) for r in rows], None),
-            lambda: (f"times {factor:.3g}", [with_place(r, [factor * c for c in r[:3]]) for r in rows], lambda p: tuple(c / factor for c in p)),
-            lambda: (f"shifted by {math.hypot(*shift):.3g}", [with_place(r, [a + b for a, b in zip(r, shift)]) for r in rows],
-                     lambda p: tuple(a - b for a, b in zip(p, shift))),
-            lambda: ("rotated", [with_place(r, apply(matrix, r[:3])) for r in rows], lambda p: apply(transposed(matrix), p)),
-            lambda: (f"{len(twins)} twins within {near:.1g}", rows + twins, None),
-            lambda: ("copies in single precision", rows + single, None),
-            lambda: ("copies", rows + draw.sample(rows, count // 2), None),
-            lambda: (f"a stray point {far} extents away", rows + [stray], None),
-        ])()
-        yield fit_case(world, k, "fit", what, points.csv(changed), back or (lambda p: p))
+        what, rows, back = fit_form(world.points[k], draw)
+        yield fit_case(world, k, "fit", what, world.points[k].csv(rows), back)
 
 
 def fit_mistakes(world):
