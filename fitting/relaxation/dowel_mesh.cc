@@ -38,6 +38,54 @@ std::vector<int> Ordered(std::span<const Vec2> uv) {
   return order;
 }
 
+Vec2 ToVec(const Kernel::Point_2& p) { return {p.x(), p.y()}; }
+
+bool OnOneCircle(const std::array<Vec2, 4>& p) {
+  constexpr double kSame = 1e-9;  // of the radius
+  const Vec2 ab = p[1] - p[0], ac = p[2] - p[0];
+  const double twice = 2 * (ab.x() * ac.y() - ab.y() * ac.x());
+  const Vec2 center = p[0] + Vec2(ac.y() * ab.squaredNorm() - ab.y() * ac.squaredNorm(),
+                                  ab.x() * ac.squaredNorm() - ac.x() * ab.squaredNorm()) /
+                                 twice;
+  const double radius = (center - p[0]).norm();
+  return std::abs((center - p[3]).norm() - radius) < kSame * radius;
+}
+
+// How much nearer to u = 1/2 the upper end of a link is than its lower end.
+double RiseToMiddle(const Vec2& a, const Vec2& b) {
+  const Vec2 &low = a.y() < b.y() ? a : b, &high = a.y() < b.y() ? b : a;
+  return std::abs(low.x() - 0.5) - std::abs(high.x() - 0.5);
+}
+
+// Four points on one circle, as those of a grid, have two Delaunay links. Takes the one whose upper
+// end is nearer to u = 1/2, so that the mirror image of the points gets the mirrored links.
+void ChooseLinks(std::span<const Vec2> uv, Delaunay& delaunay) {
+  using Vertex = Delaunay::Vertex_handle;
+  std::vector<std::pair<Vertex, Vertex>> turned;
+  for (auto edge = delaunay.finite_edges_begin(); edge != delaunay.finite_edges_end(); ++edge) {
+    const auto& [face, k] = *edge;
+    const Vertex a = face->vertex(Delaunay::ccw(k)), b = face->vertex(Delaunay::cw(k)),
+                 c = face->vertex(k), d = delaunay.mirror_vertex(face, k);
+    if (delaunay.is_infinite(c) || delaunay.is_infinite(d) ||
+        !OnOneCircle(
+            {ToVec(a->point()), ToVec(b->point()), ToVec(c->point()), ToVec(d->point())})) {
+      continue;
+    }
+    constexpr double kTie = 1e-9;
+    if (RiseToMiddle(uv[c->info()], uv[d->info()]) >
+        RiseToMiddle(uv[a->info()], uv[b->info()]) + kTie) {
+      turned.emplace_back(a, b);
+    }
+  }
+  for (const auto& [a, b] : turned) {
+    Delaunay::Face_handle face;
+    int k = -1;
+    if (delaunay.is_edge(a, b, face, k)) {
+      delaunay.flip(face, k);
+    }
+  }
+}
+
 }  // namespace
 
 DowelMesh::DowelMesh(const HSplineSurface& template_surface, std::span<const Vec2> uv,
@@ -62,6 +110,7 @@ void DowelMesh::Link(std::span<const Vec2> uv) {
     }
     corner_[k] = vertex->info();
   }
+  ChooseLinks(uv, delaunay);
   std::set<std::array<int, 2>> edges;
   for (auto face = delaunay.finite_faces_begin(); face != delaunay.finite_faces_end(); ++face) {
     const std::array<int, 3> t = {face->vertex(0)->info(), face->vertex(1)->info(),

@@ -28,12 +28,15 @@
 //      neighbours fixed, RelaxJointly the sum of the terms' cost and all penalties.
 //   5. A corner in `kept` does not move.
 //   6. The order of the given points has no effect on the result.
+//   7. Points and surface mirrored at u = 1/2 give the mirrored result, apart from links that cross
+//      u = 1/2.
 #include "fitting/relaxation/relaxation.h"
 
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <tuple>
 #include <type_traits>
 #include <utility>
 #include <vector>
@@ -115,10 +118,13 @@ std::vector<int> Relaxer::Corners() const {
 
 std::vector<int> Relaxer::Order() const {
   std::vector<int> order = Corners();
-  std::sort(order.begin(), order.end(), [&](int a, int b) {
-    const Vec2 &p = mesh_.rest_uv()[a], &q = mesh_.rest_uv()[b];
-    return std::pair(p.x(), p.y()) < std::pair(q.x(), q.y());
-  });
+  // From the middle outwards, so that the mirror image of the points moves as their mirror image.
+  const auto key = [&](int corner) {
+    constexpr double kSame = 1e9;  // places per unit: mirrored u differ by less
+    const Vec2& uv = mesh_.rest_uv()[corner];
+    return std::tuple(std::round(kSame * std::abs(uv.x() - 0.5)), uv.y(), uv.x());
+  };
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return key(a) < key(b); });
   return order;
 }
 
