@@ -231,6 +231,13 @@ class Attack:
             self.words.setdefault(shape, (case, line))
 
 
+def in_batches(pool, run, cases):
+    """Results in the order of the cases. Few cases are held at a time, because a child counts our memory as its own before it starts."""
+    numbers, cases = itertools.count(), iter(cases)
+    while batch := list(itertools.islice(cases, 32)):
+        yield from pool.map(run, batch, itertools.islice(numbers, len(batch)))
+
+
 VERDICTS = ["right", "noted", "unusable", "refused", "silent"]
 
 
@@ -280,13 +287,13 @@ def main():
             shutil.copytree(root / "seeds", given.good, symlinks=True)
         world = laws.World(str(program), configs, root / "seeds", given.seed) if given.laws else None
         cases = kinds.cases(str(program), root / "seeds", given.seed, given.cases) if given.cases else []
-        cases += laws.cases(world, given.laws) if world else []
-        cases = [c for c in cases if given.only in (None, c.kind) and given.case in (None, c.id)]
+        cases = itertools.chain(cases, laws.cases(world, given.laws) if world else [])
+        cases = (c for c in cases if given.only in (None, c.kind) and given.case in (None, c.id))
         attack = Attack(str(program), root)
         ready_s = time.monotonic() - start
         table, findings, verdicts = {}, [], {}
         with concurrent.futures.ThreadPoolExecutor(given.jobs) as pool:
-            for case, got, found, folder, verdict in pool.map(attack.run, cases, itertools.count()):
+            for case, got, found, folder, verdict in in_batches(pool, attack.run, cases):
                 if verdict:
                     row = verdicts.setdefault(case.kind, {**dict.fromkeys(VERDICTS, 0), "cpu_s": 0.0})
                     row[verdict] += 1
