@@ -572,14 +572,15 @@ std::vector<int> CountSteps(const std::vector<double>& distances, double step) {
 }
 
 // Unequal distances are counted in steps of 1, but for those that are about twice as long as both
-// neighbours: there a slice is missing.
+// neighbours and most others: there a slice is missing.
 std::vector<int> CountUnequalSteps(const std::vector<double>& distances) {
   constexpr double kMissing = 1.9;
+  const double median = Median(distances);
   std::vector<int> counts;
   for (std::size_t k = 0; k < distances.size(); ++k) {
     const double below = k > 0 ? distances[k - 1] : 0;
     const double above = k + 1 < distances.size() ? distances[k + 1] : 0;
-    counts.push_back(distances[k] > kMissing * std::max(below, above) ? 2 : 1);
+    counts.push_back(distances[k] > kMissing * std::max({below, above, median}) ? 2 : 1);
   }
   return counts;
 }

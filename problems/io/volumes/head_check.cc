@@ -129,6 +129,14 @@ bool IsHead(const GreyLevels& levels) {
   return IsAir(levels.air) && IsSoftTissue(levels.tissue) && levels.tissue_share >= kMinTissueShare;
 }
 
+bool HasBone(const Histogram& histogram, const GreyLevels& levels) {
+  constexpr double kMinBone = 0.02;  // of what is denser than air
+  const auto count = [&](double low) {
+    return static_cast<double>(histogram.Count(static_cast<int>(low), -kLowest));
+  };
+  return count(levels.tissue + 300) > kMinBone * count(levels.air + 300);
+}
+
 constexpr double kAirToTissue = 1040;
 
 std::string DescribeLevels(const GreyLevels& levels) {
@@ -160,39 +168,43 @@ GreyLevels FindGreyLevels(const CtVolume& volume) {
   constexpr double kMinShare = 0.02;  // of all voxels, for air
   const Histogram histogram(volume);
   const Peaks peaks = FindPeaks(histogram);
-  GreyLevels first;
+  GreyLevels lowest;
   for (std::size_t n = 0; n < peaks.values.size(); ++n) {
-    if (static_cast<double>(peaks.counts[n]) >= kMinShare * static_cast<double>(histogram.All())) {
-      const GreyLevels levels = LevelsAbove(histogram, peaks, n);
-      if (IsHead(levels)) {
-        return levels;  // lower peaks are values that fill what was not scanned
-      }
-      first = std::isnan(first.air) ? levels : first;
+    if (static_cast<double>(peaks.counts[n]) < kMinShare * static_cast<double>(histogram.All())) {
+      continue;
+    }
+    const GreyLevels levels = LevelsAbove(histogram, peaks, n);
+    if (std::isnan(lowest.air)) {
+      lowest = levels;
+    }
+    // Lower peaks are values that fill what was not scanned, if there is bone above the tissue.
+    if (IsHead(levels) && HasBone(histogram, levels)) {
+      return levels;
     }
   }
-  return first;
+  return lowest;
 }
 
 void CheckHounsfieldUnits(const CtVolume& volume, double skin_hu, double bone_hu,
                           std::vector<std::string>& notes) {
   const GreyLevels levels = FindGreyLevels(volume);
-  if (IsHead(levels) || std::isnan(levels.tissue) || IsSoftTissue(levels.air)) {
+  if (IsHead(levels) || std::isnan(levels.tissue)) {
     return;  // a head, or nothing to compare
   }
-  constexpr double kMaxShift = 250;
   const bool has_tissue = levels.tissue_share >= kMinTissueShare;
-  if (!has_tissue && std::abs(levels.air + 1000) <= kMaxShift) {
-    notes.push_back(fmt::format(
-        "no soft tissue near 0 to 100 HU stands out (air has about {:.0f}): a dry skull, or values "
-        "of another scale",
-        levels.air));
+  if (!has_tissue) {
+    if (IsAir(levels.air)) {
+      notes.push_back(fmt::format(
+          "no soft tissue near 0 to 100 HU stands out (air has about {:.0f}): a dry skull, or "
+          "values of another scale",
+          levels.air));
+    }
     return;
   }
   const double distance = levels.tissue - levels.air;
   const double skin = (skin_hu - levels.air) / distance,
                bone = (bone_hu - levels.tissue) / distance;
-  const bool suits = skin > 0.55 && skin < 0.95 && bone > 0.06 && bone < 0.8;
-  if (has_tissue && suits) {
+  if (skin > 0.65 && skin < 0.92 && bone > 0.1 && bone < 0.45) {  // 0.77 and 0.18 in a CT
     notes.push_back(fmt::format("{}; check the surfaces", DescribeLevels(levels)));
     return;
   }

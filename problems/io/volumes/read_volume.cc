@@ -10,6 +10,7 @@
 #include <cstring>
 #include <fstream>
 #include <functional>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <sstream>
@@ -312,7 +313,20 @@ void CheckSkewness(const CtVolume& volume, const std::string& where,
   }
 }
 
+// Values that are not numbers get the lowest value that is one, which is that of air.
+void FillWithAir(VoxelArray& array) {
+  constexpr std::int16_t kNoNumber = std::numeric_limits<std::int16_t>::min();
+  std::int16_t lowest = std::numeric_limits<std::int16_t>::max();
+  for (const std::int16_t value : array.values) {
+    lowest = value == kNoNumber ? lowest : std::min(lowest, value);
+  }
+  std::ranges::replace(array.values, kNoNumber, lowest);
+}
+
 VolumeReading Finish(VoxelArray array, VolumeReading reading, const std::string& where) {
+  if (array.not_finite > 0) {
+    FillWithAir(array);
+  }
   std::vector<std::string> notes = array.notes;
   CheckValues(array, where, notes);
   reading.volume = ToCtVolume(std::move(array), where);
@@ -434,7 +448,14 @@ VolumeReading ReadSeries(const DicomSeries& series, const ReadVolumeOptions& opt
   return Finish(std::move(array), std::move(reading), where);
 }
 
-// Throws IoError for empty files that are named like the slices, because copying them failed.
+bool BeginsWithZeros(const fs::path& file) {
+  std::array<char, 132> head{};  // as long as the part of a DICOM file that ends with "DICM"
+  std::ifstream(file, std::ios::binary).read(head.data(), head.size());
+  return std::ranges::count(head, '\0') == static_cast<std::ptrdiff_t>(head.size());
+}
+
+// Throws IoError for files that are named like the slices and are empty, or hold zeros only,
+// because copying them failed.
 void RequireNoEmptyFiles(const std::vector<fs::path>& files,
                          const std::vector<DicomHeader>& headers, const std::string& where) {
   for (const fs::path& file : files) {
@@ -442,9 +463,11 @@ void RequireNoEmptyFiles(const std::vector<fs::path>& files,
       return header.file.parent_path() == file.parent_path() &&
              header.file.extension() == file.extension();
     });
-    if (is_like_slice && fs::file_size(file) == 0) {
-      throw IoError(fmt::format("{}: the file {} is empty; copy it again, or remove it", where,
-                                file.filename().string()));
+    if (is_like_slice && BeginsWithZeros(file)) {
+      throw IoError(
+          fmt::format("{}: the file {} is empty or was copied in part; copy it again, or "
+                      "remove it",
+                      where, file.filename().string()));
     }
   }
 }

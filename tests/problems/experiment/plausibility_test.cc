@@ -140,7 +140,10 @@ const std::vector<Mistake>& Mistakes() {
       {"Flat", "template_factor",
        [](Example& c) { MoveFace(c, [](const Vec3& p) { return Vec3(p.x(), 0, p.z()); }); }},
       {"CrushedToAPoint", "template_factor",
-       [](Example& c) { MoveFace(c, [](const Vec3&) { return Vec3(1, 2, 3); }); }},
+       [](Example& c) {
+         c.face = Tessellate(c.surface, kFaceQuadsPerPatch);
+         std::ranges::fill(c.face->mesh.points, Vec3(1, 2, 3));
+       }},
       {"InsideTheHead", "bone_most_mm", [](Example& c) { ScaleFace(c, 0.8); }},
       {"UnderTheBone", "bone_share", [](Example& c) { ScaleFace(c, 0.93); }},
       {"FarAway", "marker_mm",
