@@ -16,11 +16,11 @@
 namespace semblance::fitting {
 namespace {
 
-const HSplineShape kShape = {.patches_u = 8, .patches_v = 8, .max_level = 4};
+const HSplineShape kMarkedShape = {.patches_u = 8, .patches_v = 8, .max_level = 4};
 
 FitResult FitBy(const AdaptivePlan& plan) {
   const FitTarget target = testing::Scattered(testing::FrankePoint, 30000, 1e-4, 7);
-  return Fit(testing::PlainStart(kShape), target, {},
+  return Fit(testing::PlainStart(kMarkedShape), target, {},
              {.plan = plan, .terms = {PointTerm{}}, .solver = Solver::kFastest}, {});
 }
 

@@ -158,7 +158,7 @@ TEST(KrigingProcess, StatesNoSdWhereTheVarianceIsNegative) {
   EXPECT_EQ(through.ValueAt(Eigen::Vector3d(0, 10, 10), one).sd_mm, 0);
 }
 
-KrigingData DataOf(const DowelScene& scene) {
+KrigingData KrigingDataAt(const DowelScene& scene) {
   const auto n = static_cast<Eigen::Index>(scene.dowels.size());
   KrigingData data{Eigen::MatrixXd(n, n), Eigen::VectorXd(n), Eigen::VectorXd::Zero(n),
                    Eigen::MatrixXd::Ones(n, 1)};
@@ -179,7 +179,7 @@ INSTANTIATE_TEST_SUITE_P(Kriging, EveryCovariance, ::testing::Range(0, 4));
 TEST_P(EveryCovariance, GradientOfTheDevianceEqualsItsNumericTwin) {
   const auto covariance = static_cast<Covariance>(GetParam());
   const DowelScene scene = ScatteredScene(20);
-  const KrigingData data = DataOf(scene);
+  const KrigingData data = KrigingDataAt(scene);
   const auto deviance = [&](const Vec2& logs) {
     return KrigingProcess(covariance, data, {std::exp(logs[0]), std::exp(logs[1])}).Deviance();
   };
@@ -214,7 +214,7 @@ TEST_P(EveryCovariance, FitIsNoWorseThanAnyPointOfADenseGrid) {
   DowelScene scene = ScatteredScene(25);
   scene.network.areas.clear();
   const DepthProcess best = ModelOf(free, scene);
-  const KrigingData data = DataOf(scene);
+  const KrigingData data = KrigingDataAt(scene);
   const auto cost = [&](double length_mm, double signal_mm) {
     const double away = std::log(length_mm / free.length_prior_mm) / free.length_prior_spread;
     return KrigingProcess(free.covariance, data, {length_mm, signal_mm}).Deviance() + away * away;
@@ -266,7 +266,7 @@ TEST_P(EveryCovariance, FitOfALongLengthFindsTheClosedForm) {
   for (Dowel& dowel : scene.dowels) {
     dowel.sd_mm = kNaN;
   }
-  const KrigingData data = DataOf(scene);
+  const KrigingData data = KrigingDataAt(scene);
   const auto n = data.depth_mm.size();
   for (const double length_mm : {60.0, 1000.0, 10000.0}) {
     Eigen::MatrixXd r = 1e-10 * Eigen::MatrixXd::Identity(n, n);

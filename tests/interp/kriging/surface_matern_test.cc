@@ -110,7 +110,7 @@ TEST_P(EveryAlpha, DepthAndSdAreThePosteriorOfDenseMatrices) {
                   DenseCorrelations(scene.skull, GetParam(), 40, 12));
 }
 
-SurfaceMaternData DataOf(const DowelScene& scene) {
+SurfaceMaternData SurfaceData(const DowelScene& scene) {
   const auto n = std::ssize(scene.dowels);
   SurfaceMaternData data{Eigen::VectorXd(n), Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Ones(n, 1)};
   for (Eigen::Index k = 0; k < n; ++k) {
@@ -134,7 +134,7 @@ TEST_P(EveryAlpha, CostIsTheGaussianDensityOfTheContrasts) {
   const DowelScene scene = SmallScene();
   const SurfaceMatern options{.alpha = GetParam(), .length_prior_spread = 1e9, .fit_nugget = true};
   const ReducedMatern correlations = CorrelationsOf(scene, options);
-  const SurfaceMaternData data = DataOf(scene);
+  const SurfaceMaternData data = SurfaceData(scene);
   const auto n = data.depth_mm.size();
   const std::vector<Eigen::Index> at = VerticesOf(scene);
   const Eigen::MatrixXd contrasts =
@@ -166,7 +166,7 @@ TEST_P(EveryAlpha, GradientOfTheCostEqualsItsNumericTwin) {
   const DowelScene scene = SmallScene();
   const SurfaceMatern options{.alpha = GetParam(), .fit_nugget = true};
   const ReducedMatern correlations = CorrelationsOf(scene, options);
-  const SurfaceMaternData data = DataOf(scene);
+  const SurfaceMaternData data = SurfaceData(scene);
   const Eigen::VectorXd logs = Vec3(std::log(35.0), std::log(1.3), std::log(0.4));
   Eigen::VectorXd exact;
   SurfaceMaternCost(options, data, correlations, logs, &exact);
@@ -184,7 +184,7 @@ TEST_P(EveryAlpha, FitIsNoWorseThanAnyPointOfAGrid) {
   const DowelScene scene = SmallScene();
   const SurfaceMatern options{.alpha = GetParam(), .fit_nugget = true};
   const ReducedMatern correlations = CorrelationsOf(scene, options);
-  const SurfaceMaternData data = DataOf(scene);
+  const SurfaceMaternData data = SurfaceData(scene);
   const SurfaceMaternHyper best = FitHyper(options, data, correlations, {});
   const auto cost = [&](double length_mm, double signal_mm, double nugget_mm) {
     const Vec3 logs(std::log(length_mm), std::log(signal_mm), std::log(nugget_mm));
@@ -204,7 +204,7 @@ TEST_P(EveryAlpha, FitIsNoWorseThanAnyPointOfAGrid) {
 // As in kriging, a long length needs a signal of many times the depths' spread.
 TEST_P(EveryAlpha, FitOfALongLengthIsNoWorseThanAnySignal) {
   const DowelScene scene = SmallScene();
-  SurfaceMaternData data = DataOf(scene);
+  SurfaceMaternData data = SurfaceData(scene);
   data.nugget_mm2.setZero();
   const SurfaceMatern options{.alpha = GetParam(), .length_mm = 5000};
   const ReducedMatern correlations = CorrelationsOf(scene, options);

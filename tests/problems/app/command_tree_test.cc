@@ -15,7 +15,7 @@ CommandNode NamedCommand(const std::string& name) {
   return {.name = name, .purpose = {}, .options = {}, .commands = {}};
 }
 
-const CommandNode kProgram{
+const CommandNode kTree{
     .name = "semblance",
     .purpose = {},
     .options = {{.names = {"-h", "--help"}, .value = {}, .purpose = {}}},
@@ -30,7 +30,7 @@ const CommandNode kProgram{
                   .options = {},
                   .commands = {NamedCommand("extract"), NamedCommand("apply")}}}};
 
-std::string Message(const std::vector<std::string>& words) { return UnknownWord(kProgram, words); }
+std::string Message(const std::vector<std::string>& words) { return UnknownWord(kTree, words); }
 
 TEST(UnknownWord, SuggestsTheNearestCommand) {
   EXPECT_EQ(Message({"rnu"}), "there is no command 'rnu'; did you mean 'run'?");

@@ -38,7 +38,7 @@ using testing::PlainCsv;
 using testing::Scattered;
 using testing::UvCsv;
 
-const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs/fit";
+const std::string kFitConfigs = SEMBLANCE_SOURCE_DIR "/configs/fit";
 
 class FitCommand : public ::testing::Test {
  protected:
@@ -57,7 +57,7 @@ TEST_F(FitCommand, FrankesFunctionAndTheHeadComeOut) {
   Write("head.csv", UvCsv(Scattered(HeadPoint, 30000, 1e-4, 1)));
   for (const char* name : {"franke", "head"}) {
     const auto outcome =
-        Call(fmt::format("fit {0}.csv {1}/{0}.yaml --out {0} --quiet", name, kConfigs));
+        Call(fmt::format("fit {0}.csv {1}/{0}.yaml --out {0} --quiet", name, kFitConfigs));
     ASSERT_EQ(outcome.code, 0) << outcome.err;
     EXPECT_THAT(outcome.out, HasSubstr("(u,v): given"));
     for (const char* file : {"surface.ply", "residuals.csv", "resolved.yaml", "timing.json"}) {
@@ -78,7 +78,7 @@ TEST_F(FitCommand, FrankesFunctionAndTheHeadComeOut) {
 TEST_F(FitCommand, AHeightFieldKeepsItsNoise) {
   Write("franke.csv", PlainCsv(Scattered(FrankePoint, 5000, 1e-3, 1)));
   const auto outcome =
-      Call(fmt::format("fit franke.csv {}/height_field.yaml --out out --quiet", kConfigs));
+      Call(fmt::format("fit franke.csv {}/height_field.yaml --out out --quiet", kFitConfigs));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   const auto json = nlohmann::json::parse(ReadFileBytes(folder_ / "out/result.json"));
   const double noise = std::sqrt(3) * 1e-3;
@@ -88,7 +88,7 @@ TEST_F(FitCommand, AHeightFieldKeepsItsNoise) {
 
 TEST_F(FitCommand, TheTableOfTheReadmeIsFittedWithoutAConfiguration) {
   const auto outcome =
-      Call(fmt::format("fit {}/points.csv --set residuals=ply --out out --quiet", kConfigs));
+      Call(fmt::format("fit {}/points.csv --set residuals=ply --out out --quiet", kFitConfigs));
   ASSERT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("outliers left out"));
   EXPECT_TRUE(fs::exists(folder_ / "out/residuals.ply"));
@@ -335,7 +335,7 @@ TEST_F(FitCommand, InputFilesAreNotReplaced) {
     EXPECT_FALSE(fs::exists(folder_ / folder / ".semblance-part"));
   };
   refused("own/residuals.csv --out own", "own/residuals.csv", "own");
-  refused(kConfigs + "/points.csv own/resolved.yaml --out own", "own/resolved.yaml", "own");
+  refused(kFitConfigs + "/points.csv own/resolved.yaml --out own", "own/resolved.yaml", "own");
   fs::rename(folder_ / "own/residuals.csv", folder_ / "own/points.csv");
   EXPECT_EQ(Call("fit own/points.csv --out own --force --quiet").code, 0)
       << "points may lie beside what comes of them";
@@ -345,7 +345,7 @@ TEST_F(FitCommand, ForceLeavesNoResidualsOfAnEarlierFit) {
   const auto there = [&](const std::string& residuals) {
     const auto outcome = Call(fmt::format(
         "fit {}/points.csv --out out --force --quiet --set report=false --set residuals={}",
-        kConfigs, residuals));
+        kFitConfigs, residuals));
     EXPECT_EQ(outcome.code, 0) << outcome.err;
     return std::pair(fs::exists(folder_ / "out/residuals.csv"),
                      fs::exists(folder_ / "out/residuals.ply"));
@@ -393,7 +393,7 @@ TEST_F(FitCommand, AWidthWithoutALossIsReported) {
   const auto outcome =
       Call(fmt::format("fit {}/points.csv --out out --quiet --set 'fit.terms=[{{type: points, "
                        "loss_width_mm: 3}}, {{type: smoothness, weight: auto, length_mm: 1}}]'",
-                       kConfigs));
+                       kFitConfigs));
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("fit.terms[0].loss_width_mm: `loss: none` ignores it"));
 }

@@ -17,7 +17,7 @@ using ::testing::AllOf;
 using testing::CallProgram;
 using ::testing::HasSubstr;
 
-const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs";
+const std::string kImportConfigs = SEMBLANCE_SOURCE_DIR "/configs";
 
 class ImportCommands : public ::testing::Test {
  protected:
@@ -90,7 +90,7 @@ TEST_F(ImportCommands, ASubjectMayBeAFolderOfDicom) {
       folder_ / "run.yaml",
       fmt::format("subject: {{type: ct, volume: head/ct, landmarks: head/landmarks.yaml}}\n"
                   "tissue: {{depths: measured}}\nnetwork: {}/networks/standard32.yaml\n",
-                  kConfigs));
+                  kImportConfigs));
   const testing::Outcome outcome = CallProgram(folder_, "check run.yaml");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_THAT(outcome.out, HasSubstr("no fault found"));

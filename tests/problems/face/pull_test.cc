@@ -14,11 +14,11 @@ namespace {
 
 using testing::RandomSurface;
 
-const HSplineShape kShape{.patches_u = 6, .patches_v = 5, .max_level = 3};
+const HSplineShape kPulledShape{.patches_u = 6, .patches_v = 5, .max_level = 3};
 
 TEST(Pull, ThePointGoesWhereItIsPulledOnEveryLevel) {
   for (int level = 0; level <= 3; ++level) {
-    const HSplineSurface before = RandomSurface(kShape, 3);
+    const HSplineSurface before = RandomSurface(kPulledShape, 3);
     Pull pull{.level = level, .uv = {0.37, 0.61}, .by_mm = {1, -2, 0.5}};
     HSplineSurface after = before;
     ApplyEdits(Pulled(pull, before, {}), after);
@@ -28,7 +28,7 @@ TEST(Pull, ThePointGoesWhereItIsPulledOnEveryLevel) {
 }
 
 TEST(Pull, WhatLiesBeyondTheReachStays) {
-  const HSplineSurface before = RandomSurface(kShape, 4);
+  const HSplineSurface before = RandomSurface(kPulledShape, 4);
   HSplineSurface after = before;
   ApplyEdits(Pulled({.level = 2, .uv = {0.2, 0.2}, .by_mm = {0, 0, 5}, .reach = 2}, before, {}),
              after);
@@ -39,7 +39,7 @@ TEST(Pull, WhatLiesBeyondTheReachStays) {
 }
 
 TEST(Pull, ReachesAcrossTheSeamOfATube) {
-  HSplineShape shape = kShape;
+  HSplineShape shape = kPulledShape;
   shape.closure = Closure::kPeriodicU;
   const HSplineSurface before = testing::SmoothSurface(shape, 4);
   HSplineSurface after = before;
@@ -50,7 +50,7 @@ TEST(Pull, ReachesAcrossTheSeamOfATube) {
 }
 
 TEST(Pull, ManyPullsAreOneScriptThatReplaysOnTheSurfaceBefore) {
-  const HSplineSurface before = RandomSurface(kShape, 5);
+  const HSplineSurface before = RandomSurface(kPulledShape, 5);
   HSplineSurface now = before;
   EditScript script;
   Random random(7);
@@ -92,7 +92,7 @@ TEST(Pull, LeftIsTheSubjectsLeft) {
 }
 
 TEST(Pull, WhatCannotBeIsRefused) {
-  const HSplineSurface face = RandomSurface(kShape, 6);
+  const HSplineSurface face = RandomSurface(kPulledShape, 6);
   const Vec2 uv(0.5, 0.5);
   EXPECT_THROW(Pulled({.level = 4, .uv = uv, .by_mm = {1, 0, 0}}, face, {}), InputError);
   EXPECT_THROW(Pulled({.level = 1, .uv = uv, .by_mm = {kNaN, 0, 0}}, face, {}), InputError);

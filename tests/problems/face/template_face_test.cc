@@ -19,14 +19,16 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-const TemplateFace& Face() {
+const TemplateFace& DefaultFace() {
   static const TemplateFace face = MakeTemplateFace({});
   return face;
 }
 
 Vec3 Mirrored(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
 
-Vec3 PointOf(const std::string& site) { return Face().surface.Point(Face().site_uv.at(site)); }
+Vec3 PointOf(const std::string& site) {
+  return DefaultFace().surface.Point(DefaultFace().site_uv.at(site));
+}
 
 // The distance of the surface from HeadPoint at the same (u,v), over a grid of samples_u x
 // samples_v points (>= 2 each).
@@ -53,7 +55,7 @@ TemplateResidual ResidualToFormula(const HSplineSurface& surface, int samples_u,
 }
 
 TEST(TemplateFace, StaysWithinHalfAMillimetreOfTheFormula) {
-  const TemplateResidual residual = ResidualToFormula(Face().surface, 301, 301);
+  const TemplateResidual residual = ResidualToFormula(DefaultFace().surface, 301, 301);
   EXPECT_LT(residual.rms_mm, 0.06);
   EXPECT_LT(residual.max_mm, 0.6);
   EXPECT_GT(residual.max_mm, residual.rms_mm);
@@ -73,7 +75,8 @@ TEST(TemplateFace, IsMirrorSymmetric) {
   for (int j = 0; j <= 100; ++j) {
     for (int i = 0; i <= 100; ++i) {
       const double u = i / 200.0, v = j / 100.0;
-      const Vec3 right = Face().surface.Point({u, v}), left = Face().surface.Point({1 - u, v});
+      const Vec3 right = DefaultFace().surface.Point({u, v}),
+                 left = DefaultFace().surface.Point({1 - u, v});
       ASSERT_LT((right - Mirrored(left)).norm(), 1e-9) << u << " " << v;
     }
   }
@@ -95,20 +98,20 @@ TEST(TemplateFace, NormalsPointOutwardEverywhere) {
 TEST(TemplateFace, HasTheThirtyTwoSitesInsideTheDomain) {
   std::set<std::pair<double, double>> places;
   for (const std::string& code : StandardSiteCodes()) {
-    ASSERT_TRUE(Face().site_uv.contains(code)) << code;
-    const Vec2 uv = Face().site_uv.at(code);
+    ASSERT_TRUE(DefaultFace().site_uv.contains(code)) << code;
+    const Vec2 uv = DefaultFace().site_uv.at(code);
     EXPECT_GT(uv.minCoeff(), 0.02) << code;
     EXPECT_LT(uv.maxCoeff(), 0.98) << code;
     places.insert({uv.x(), uv.y()});
   }
-  EXPECT_EQ(Face().site_uv.size(), 32u);
+  EXPECT_EQ(DefaultFace().site_uv.size(), 32u);
   EXPECT_EQ(places.size(), 32u);
 }
 
 TEST(TemplateFace, SitesAreMirroredAndOnTheirSides) {
-  for (const auto& [code, uv] : Face().site_uv) {
+  for (const auto& [code, uv] : DefaultFace().site_uv) {
     if (code.ends_with("_l")) {
-      const Vec2 right = Face().site_uv.at(code.substr(0, code.size() - 2) + "_r");
+      const Vec2 right = DefaultFace().site_uv.at(code.substr(0, code.size() - 2) + "_r");
       EXPECT_EQ(right, Vec2(1 - uv.x(), uv.y())) << code;
       EXPECT_GT(PointOf(code).x(), 25) << code;
     } else if (!code.ends_with("_r")) {
@@ -121,8 +124,8 @@ TEST(TemplateFace, SitesAreMirroredAndOnTheirSides) {
 TEST(TemplateFace, MidlineSitesClimbTheProfile) {
   double last = 0;
   for (const char* code : {"me", "pg", "sm", "id", "pr", "mp", "rhi", "n", "g", "sg"}) {
-    EXPECT_GT(Face().site_uv.at(code).y(), last) << code;
-    last = Face().site_uv.at(code).y();
+    EXPECT_GT(DefaultFace().site_uv.at(code).y(), last) << code;
+    last = DefaultFace().site_uv.at(code).y();
   }
 }
 
@@ -146,13 +149,13 @@ TEST(TemplateFace, SitesKeepTheOrderOfTheirBones) {
 
 TEST(TemplateFace, SitesDoNotDependOnThePatches) {
   const TemplateFace other = MakeTemplateFace({.patches_u = 6, .patches_v = 10, .max_level = 2});
-  EXPECT_EQ(other.site_uv, Face().site_uv);
+  EXPECT_EQ(other.site_uv, DefaultFace().site_uv);
   EXPECT_EQ(other.surface.shape().patches_v, 10);
 }
 
 TEST(TemplateFace, FeaturesHaveVerticesOfTheirRegion) {
   std::vector<std::string> names;
-  for (const TemplateFeature& feature : Face().features) {
+  for (const TemplateFeature& feature : DefaultFace().features) {
     names.push_back(feature.name);
     EXPECT_GE(feature.vertices.size(), 40u) << feature.name;
     EXPECT_TRUE(std::is_sorted(feature.vertices.begin(), feature.vertices.end()));
@@ -160,21 +163,21 @@ TEST(TemplateFace, FeaturesHaveVerticesOfTheirRegion) {
     for (const VertexId& id : feature.vertices) {
       ASSERT_GE(id.level, 1);
       ASSERT_LE(id.level, 3);
-      const ControlNet& net = Face().surface.Net(id.level);
+      const ControlNet& net = DefaultFace().surface.Net(id.level);
       ASSERT_TRUE(id.i >= 0 && id.i < net.columns && id.j >= 0 && id.j < net.rows);
     }
   }
-  const std::vector<VertexId> all = FeatureVertices(Face());
+  const std::vector<VertexId> all = FeatureVertices(DefaultFace());
   EXPECT_EQ(std::set<VertexId>(all.begin(), all.end()).size(), all.size());
-  EXPECT_GT(all.size(), Face().features[0].vertices.size());
+  EXPECT_GT(all.size(), DefaultFace().features[0].vertices.size());
   EXPECT_THAT(names, ElementsAre("nose", "mouth", "eye_l", "eye_r"));
 }
 
 TEST(TemplateFace, FeatureRegionsHoldTheirParts) {
-  const auto region = [](int k) { return *Face().features[k].region; };
+  const auto region = [](int k) { return *DefaultFace().features[k].region; };
   Vec3 tip = Vec3::Zero();
   for (int j = 0; j <= 1000; ++j) {
-    const Vec3 p = Face().surface.Point({0.5, j / 1000.0});
+    const Vec3 p = DefaultFace().surface.Point({0.5, j / 1000.0});
     tip = p.y() < tip.y() ? p : tip;
   }
   EXPECT_TRUE(region(0).Contains(tip));
@@ -184,7 +187,7 @@ TEST(TemplateFace, FeatureRegionsHoldTheirParts) {
   EXPECT_FALSE(region(2).Contains(PointOf("fe_l")));
   EXPECT_FALSE(region(2).Contains(PointOf("mio_l")));
   EXPECT_EQ(region(3).center, Mirrored(region(2).center));
-  EXPECT_EQ(TemplateMasks(Face()).size(), 4u);
+  EXPECT_EQ(TemplateMasks(DefaultFace()).size(), 4u);
 }
 
 TEST(TemplateFace, ASphereIsCarriedBySimilarity) {
@@ -206,10 +209,10 @@ TEST(TemplateFace, ALargerToleranceStoresLessDetail) {
 TEST(TemplateFace, OffsetsInWorldAxesMakeTheSameFace) {
   const TemplateFace world = MakeTemplateFace({.reference = OffsetReference::kWorld});
   EXPECT_EQ(world.surface.shape().reference, OffsetReference::kWorld);
-  EXPECT_NE(world.surface.Offsets(), Face().surface.Offsets());
+  EXPECT_NE(world.surface.Offsets(), DefaultFace().surface.Offsets());
   for (double u = 0.02; u < 1; u += 0.08) {
     for (double v = 0.02; v < 1; v += 0.08) {
-      EXPECT_LT((world.surface.Point({u, v}) - Face().surface.Point({u, v})).norm(), 1e-9);
+      EXPECT_LT((world.surface.Point({u, v}) - DefaultFace().surface.Point({u, v})).norm(), 1e-9);
     }
   }
 }

@@ -25,7 +25,7 @@ using ::testing::HasSubstr;
 using testing::ScratchFolder;
 using testing::WordsOf;
 
-const std::string kBase = fmt::format(
+const std::string kPlanBase = fmt::format(
     "base: {}/configs/phantom.yaml\n"
     "set: {{subject.rings: 40, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
     "      fit.plan.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
@@ -38,7 +38,7 @@ class StudyPlanTest : public ::testing::Test {
     WriteFileAtomically(file, text);
     return file;
   }
-  StudyPlan Plan(const std::string& text) { return ReadStudy(Write(kBase + text)); }
+  StudyPlan Plan(const std::string& text) { return ReadStudy(Write(kPlanBase + text)); }
   std::string Faults(const std::string& text) {
     return WordsOf<ConfigError>([&] { Plan(text); });
   }
@@ -207,12 +207,13 @@ TEST_F(StudyPlanTest, NoSubjectIsAFaultOrForCheckANote) {
       "subjects: [{name: b, optional: true, set: {subject: {type: files, skull: none.ply, "
       "landmarks: none.yaml}}}]\n";
   EXPECT_THAT(Faults(text), HasSubstr("study.yaml: no subject is left"));
-  const StudyPlan plan = ReadStudy(Write(kBase + text), WithoutSubjects::kNote);
+  const StudyPlan plan = ReadStudy(Write(kPlanBase + text), WithoutSubjects::kNote);
   EXPECT_TRUE(plan.trials.empty());
   EXPECT_THAT(plan.notes,
               ElementsAre(HasSubstr("subject b: skipped"), HasSubstr("no subject is left")));
-  EXPECT_THROW(ReadStudy(Write(kBase + text + "grid: {rounds: [one]}\n"), WithoutSubjects::kNote),
-               ConfigError);
+  EXPECT_THROW(
+      ReadStudy(Write(kPlanBase + text + "grid: {rounds: [one]}\n"), WithoutSubjects::kNote),
+      ConfigError);
 }
 
 TEST_F(StudyPlanTest, ASearchIsRefusedAndItsReplacementIsNamed) {

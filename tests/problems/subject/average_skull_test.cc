@@ -31,7 +31,7 @@ std::vector<SitePoint> Posed(bool mirrored = false) {
   return sites;
 }
 
-std::vector<SitePoint> Read(const std::string& name) {
+std::vector<SitePoint> ReadSites(const std::string& name) {
   std::vector<SitePoint> sites;
   const LandmarkFile file =
       ReadLandmarks(SEMBLANCE_SOURCE_DIR "/configs/landmarks/" + name + ".yaml").file;
@@ -77,7 +77,7 @@ TEST(AverageSkull, AMirrorImageFitsOnlyTheMirroredSkull) {
 
 TEST(AverageSkull, RealHeadsAndPhantomsFitIt) {
   for (const char* name : {"cthead", "vhm", "cranium"}) {
-    const SkullFit fit = FitAverageSkull(Read(name));
+    const SkullFit fit = FitAverageSkull(ReadSites(name));
     EXPECT_LT(fit.median_mm, 7) << name;
     EXPECT_LT(*std::ranges::max_element(fit.residual_mm), 12) << name;
     EXPECT_NEAR(fit.skull_from_average.scale, 1, 0.05) << name;
@@ -95,7 +95,7 @@ TEST(AverageSkull, RealHeadsAndPhantomsFitIt) {
 
 TEST(AverageSkull, MissingSitesArePredicted) {
   for (const char* name : {"cthead", "vhm"}) {
-    const std::vector<SitePoint> all = Read(name);
+    const std::vector<SitePoint> all = ReadSites(name);
     for (const SitePoint& left_out : all) {
       std::vector<SitePoint> rest = all;
       std::erase_if(rest, [&](const SitePoint& s) { return s.site == left_out.site; });

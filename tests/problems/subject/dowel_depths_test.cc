@@ -5,11 +5,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "problems/config/config.h"
 #include "problems/subject/dowel_placement.h"
 #include "surfaces/base/error.h"
 #include "tests/testing/scratch_file.h"
+#include "tests/testing/shapes.h"
 
 namespace semblance::problems {
 namespace {
@@ -215,6 +217,73 @@ TEST(FillDepths, NoDepthAtAllIsAnError) {
   s.file.landmarks[0].depth_along_normal_mm.reset();
   EXPECT_THAT(WordsOf<InputError>([&] { FillDepths(Measured(), s.file, s.dowels); }),
               HasSubstr("measure at least one in the landmark file"));
+}
+
+// A skull of 50 mm within a skin of 60 mm, and a dowel on it at the angle `off_deg` from the skin's
+// direction.
+struct Ball {
+  TriMesh skull = testing::SphereMesh({0, 0, 0}, 50, 60),
+          skin = testing::SphereMesh({0, 0, 0}, 60, 60);
+  MeshQuery bone{skull};
+  LandmarkFile file;
+  std::vector<Dowel> dowels;
+
+  void Add(const std::string& site, double off_deg, std::optional<double> closest_mm,
+           std::optional<double> normal_mm = {}) {
+    Landmark& landmark = file.landmarks.emplace_back();
+    landmark.site = site;
+    landmark.depth_closest_mm = closest_mm;
+    landmark.depth_along_normal_mm = normal_mm;
+    const double angle = off_deg * std::numbers::pi / 180;
+    Dowel& dowel = dowels.emplace_back();
+    dowel.site = site;
+    dowel.base = {0, 0, 50};
+    dowel.direction = {std::sin(angle), 0, std::cos(angle)};
+    dowel.depth_mm = normal_mm ? *normal_mm : *closest_mm;
+  }
+  std::vector<std::string> Turn(bool with_skin) {
+    std::vector<Dowel> all = dowels;
+    const std::vector<std::string> notes = TurnToSkin(
+        {.landmarks = file, .skin = with_skin ? &skin : nullptr, .skull = bone}, all, dowels);
+    EXPECT_EQ(all.size(), dowels.size());
+    return notes;
+  }
+};
+
+TEST(TurnToSkin, ADepthToTheClosestSkinIsLaidTowardsIt) {
+  Ball ball;
+  ball.Add("g", 70, 10.0);
+  ball.Add("n", 150, 10.0);
+  ball.Add("rhi", 70, 10.0, 25.0);  // measured along its normal: right as it is
+  const std::vector<std::string> notes = ball.Turn(true);
+  ASSERT_EQ(ball.dowels.size(), 3U);
+  EXPECT_LT((ball.dowels[0].Tip() - Vec3(0, 0, 60)).norm(), 0.3);
+  EXPECT_LT((ball.dowels[1].Tip() - Vec3(0, 0, 60)).norm(), 0.3);
+  EXPECT_NEAR(ball.dowels[2].direction.z(), std::cos(70 * std::numbers::pi / 180), 1e-12);
+  EXPECT_THAT(notes,
+              ElementsAre(AllOf(HasSubstr("site g"), HasSubstr("70 degrees from the normal")),
+                          AllOf(HasSubstr("site n"), HasSubstr("150 degrees"))));
+}
+
+TEST(TurnToSkin, DropsADowelWhoseSkinIsElsewhere) {
+  Ball ball;
+  ball.Add("g", 10, 10.0);
+  ball.Add("n", 10, 18.0);
+  EXPECT_THAT(ball.Turn(true), ::testing::Contains(AllOf(HasSubstr("site n"), HasSubstr("18.00 mm"),
+                                                         HasSubstr("dropped"))));
+  ASSERT_EQ(ball.dowels.size(), 1U);
+  EXPECT_EQ(ball.dowels[0].site, "g");
+}
+
+TEST(TurnToSkin, WithoutASkinDropsADowelThatEntersBone) {
+  Ball ball;
+  ball.Add("g", 40, 10.0);
+  ball.Add("n", 150, 10.0);
+  EXPECT_THAT(ball.Turn(false), ElementsAre(AllOf(HasSubstr("site n"), HasSubstr("into the skull"),
+                                                  HasSubstr("dropped"))));
+  ASSERT_EQ(ball.dowels.size(), 1U);
+  EXPECT_EQ(ball.dowels[0].site, "g");
+  EXPECT_NEAR(ball.dowels[0].direction.z(), std::cos(40 * std::numbers::pi / 180), 1e-12);
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ using ::testing::HasSubstr;
 using testing::RandomSurface;
 using testing::ScratchFolder;
 
-const HSplineShape kShape{
+const HSplineShape kWrittenShape{
     .patches_u = 4, .patches_v = 5, .max_level = 2, .closure = Closure::kPeriodicU};
 
 std::string Replaced(std::string text, const std::string& from, const std::string& to) {
@@ -35,7 +35,7 @@ std::string Replaced(std::string text, const std::string& from, const std::strin
 
 TEST(HSplineJson, RoundTripsToTheBit) {
   for (const Closure closure : {Closure::kOpen, Closure::kPeriodicU}) {
-    HSplineShape shape = kShape;
+    HSplineShape shape = kWrittenShape;
     shape.closure = closure;
     const HSplineSurface surface = RandomSurface(shape, 3);
     const std::string text = HSplineToJson(surface);
@@ -50,7 +50,7 @@ TEST(HSplineJson, RoundTripsToTheBit) {
 }
 
 TEST(HSplineJson, RefusesEveryOtherText) {
-  const std::string good = HSplineToJson(RandomSurface(kShape, 3, 1));
+  const std::string good = HSplineToJson(RandomSurface(kWrittenShape, 3, 1));
   const std::vector<std::pair<std::string, std::string>> faults = {
       {good.substr(0, good.size() / 2), "parse error"},
       {Replaced(good, "\"version\":1", "\"version\":2"),

@@ -117,6 +117,30 @@ TEST(OuterSkin, AnAirwayThatACutOpensIsNotOuter) {
   }
 }
 
+// A skin of two layers: the wall of a sinus or airway behind it, and a hole in the outer layer that
+// is wider than the ball.
+TEST(OuterSkin, AWallBehindAHoleIsNotOuter) {
+  const TriMesh closed = SphereMesh({0, 0, 0}, 80, 60);
+  TriMesh wall = SphereMesh({0, 0, 0}, 60, 40);
+  for (Triangle& t : wall.triangles) {
+    std::swap(t[0], t[1]);
+  }
+  TriMesh skin = Joined(closed, wall);
+  const auto is_in_hole = [&](const Triangle& t) {
+    const Vec3 middle = TriangleCentroid(skin, t);
+    return middle.norm() > 70 && middle.head<2>().norm() < 15 && middle.z() > 0;
+  };
+  ASSERT_GT(std::erase_if(skin.triangles, is_in_hole), 10U);
+  const OuterSkin found = FindOuterSkin(skin, 6);
+  EXPECT_TRUE(found.ends.empty());
+  for (std::size_t v = 0; v < skin.points.size(); ++v) {
+    const Vec3& p = skin.points[v];
+    if (p.z() < 0 || p.head<2>().norm() > 20 || p.norm() < 70) {  // beside the hole's rim
+      EXPECT_EQ(found.outer[v], p.norm() > 70) << p.transpose();
+    }
+  }
+}
+
 TEST(OuterSkin, RefusesWhatIsNoHead) {
   EXPECT_THROW(FindOuterSkin(TriMesh{}, 6), InputError);
   EXPECT_THROW(FindOuterSkin(SphereMesh({0, 0, 0}, 1e6, 10), 6), InputError);

@@ -16,7 +16,7 @@ using testing::Plate;
 
 const Vec3 kUp(0, 0, 1);
 
-TriMesh Head() { return MakePhantom({.rings = 40}).face; }
+TriMesh FaceOfHead() { return MakePhantom({.rings = 40}).face; }
 
 Similarity Turned(double degrees, const Vec3& shift) {
   const Vec3 axis = Vec3(1, 2, 3).normalized();
@@ -24,7 +24,7 @@ Similarity Turned(double degrees, const Vec3& shift) {
 }
 
 TEST(BestFit, FindsAKnownMotion) {
-  const TriMesh truth = Head();
+  const TriMesh truth = FaceOfHead();
   const Similarity moved = Turned(3, {2, -4, 1});
   const TriMesh face = Transformed(truth, moved);
   const BestFitScore score = ScoreBestFit(truth, WholeSurface(truth), face, {});
@@ -37,7 +37,7 @@ TEST(BestFit, FindsAKnownMotion) {
 }
 
 TEST(BestFit, IsNeverWorseThanTheFrameOfTheScan) {
-  const TriMesh truth = Head();
+  const TriMesh truth = FaceOfHead();
   TriMesh face = MakePhantom({.random_seed = 5, .rings = 40}).face;
   const FaceRegion region = WholeSurface(truth);
   const double in_frame = CompareFaces(truth, region, face, {}).truth_to_face.rms_mm;
@@ -54,7 +54,7 @@ TEST(BestFit, IsNeverWorseThanTheFrameOfTheScan) {
 }
 
 TEST(BestFit, ThreadsChangeNoBit) {
-  const TriMesh truth = Head(), face = Transformed(truth, Turned(2, {1, 1, 1}));
+  const TriMesh truth = FaceOfHead(), face = Transformed(truth, Turned(2, {1, 1, 1}));
   RunContext two;
   two.threads = 2;
   EXPECT_EQ(ScoreBestFit(truth, WholeSurface(truth), face, {}).truth_to_face.rms_mm,
