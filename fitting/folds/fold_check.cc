@@ -357,9 +357,7 @@ std::vector<MapSample> FewerSamples(const PlaneMap& map, std::size_t most) {
   return fewer;
 }
 
-using Indices = NearestSamples;
-
-double SquaresAroundMean(const std::vector<MapSample>& samples, const Indices& indices) {
+double SquaresAroundMean(const std::vector<MapSample>& samples, const NearestSamples& indices) {
   Vec3 mean = Vec3::Zero();
   for (const std::uint32_t n : indices) {
     mean += samples[n].position / kNearWithItself;
@@ -371,7 +369,7 @@ double SquaresAroundMean(const std::vector<MapSample>& samples, const Indices& i
   return sum / (kNearWithItself - 1);
 }
 
-double SquaresAroundPlane(const std::vector<MapSample>& samples, const Indices& indices,
+double SquaresAroundPlane(const std::vector<MapSample>& samples, const NearestSamples& indices,
                           double period_mm) {
   Eigen::Matrix<double, kNearWithItself, 3> rows, values;
   for (int n = 0; n < kNearWithItself; ++n) {
@@ -385,8 +383,8 @@ double SquaresAroundPlane(const std::vector<MapSample>& samples, const Indices& 
 }
 
 // Samples from everywhere: spread over the order, from `own` on.
-Indices FromEverywhere(std::size_t count, std::size_t own) {
-  Indices indices;
+NearestSamples FromEverywhere(std::size_t count, std::size_t own) {
+  NearestSamples indices;
   for (std::size_t n = 0; n < indices.size(); ++n) {
     indices[n] = static_cast<std::uint32_t>((own + n * count / indices.size()) % count);
   }

@@ -212,10 +212,10 @@ class SceneWriter {
         }
       }
     }
-    static constexpr std::array kColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
+    static constexpr std::array kNetColours = {"#0072b2", "#d55e00", "#009e73", "#cc79a7"};
     layers_.push_back({{"id", fmt::format("net{}", level)},
                        {"label", fmt::format("Control net, level {}", level)},
-                       {"colour", kColours[level % kColours.size()]},
+                       {"colour", kNetColours[level % kNetColours.size()]},
                        {"lines", blobs_.AddLines(net.vertices, segments)}});
   }
 

@@ -59,7 +59,7 @@ bool IsHeaderName(std::string_view name) {
   });
 }
 
-std::string_view Trimmed(std::string_view text) {
+std::string_view TrimmedSpaces(std::string_view text) {
   const std::size_t from = text.find_first_not_of(" \t");
   return from == std::string_view::npos
              ? std::string_view()
@@ -92,7 +92,7 @@ bool ReadHeader(std::string_view line, BodyHeaders& headers) {
   const std::string name = LowerCase(std::string(line.substr(0, colon)));
   if (name == "content-length") {
     ++headers.lengths;
-    headers.size = ParseSize(Trimmed(line.substr(colon + 1)));
+    headers.size = ParseSize(TrimmedSpaces(line.substr(colon + 1)));
   }
   headers.is_encoded = headers.is_encoded || name == "transfer-encoding";
   headers.has_range = headers.has_range || name == "range";

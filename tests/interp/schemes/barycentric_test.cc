@@ -298,7 +298,7 @@ TEST(Barycentric, APartialNetworkKeepsTheOtherAreasAsTheyWere) {
   DowelScene scene = FlatScene();
   const DepthField whole = FieldOf(scene);
   scene.dowels.pop_back();
-  scene.network = BuildNetwork({"", {{"sg", "g", "n"}, {"sg", "n", "rhi"}}}, scene.dowels);
+  scene.network = BuildNetwork({"", {}, {{"sg", "g", "n"}, {"sg", "n", "rhi"}}}, scene.dowels);
   ASSERT_EQ(scene.network.areas.size(), 1u);
   const DepthField partial = FieldOf(scene);
   for (std::size_t i = 0; i < whole.status.size(); ++i) {

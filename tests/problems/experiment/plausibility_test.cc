@@ -259,7 +259,7 @@ TEST_P(PlausibilityOfMistakes, IsFoundExplainedAndPlaced) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, PlausibilityOfMistakes, ::testing::ValuesIn(Mistakes()),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& mistake) { return std::string(mistake.param.name); });
 
 TEST(Plausibility, TheUnitOfDepthsIsNamed) {
   for (const auto& [factor, words] :

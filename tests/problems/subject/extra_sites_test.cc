@@ -16,16 +16,16 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using testing::WordsOf;
 
-struct Sites {
+struct SitesOption {
   ExtraSites sites;
 };
 template <class Visitor>
-void Fields(Visitor& visit, Sites& o) {
+void Fields(Visitor& visit, SitesOption& o) {
   visit(FieldInfo{.name = "sites", .doc = "all"}, o.sites);
 }
 
 ExtraSites Read(const std::string& text) {
-  return ReadConfigText<Sites>("sites: {" + text + "}\n", "a.yaml").sites;
+  return ReadConfigText<SitesOption>("sites: {" + text + "}\n", "a.yaml").sites;
 }
 
 std::string Words(const std::string& text) {
@@ -45,8 +45,8 @@ TEST(ExtraSites, AreReadAndWrittenBack) {
   EXPECT_FALSE(sites.at("c").depth);
   EXPECT_TRUE(IsHeld(sites, "n"));
   EXPECT_FALSE(IsHeld(sites, "a") || IsHeld(sites, "g"));
-  const std::string written = WriteConfig(Sites{sites});
-  EXPECT_EQ(WriteConfig(ReadConfigText<Sites>(written, "b.yaml")), written);
+  const std::string written = WriteConfig(SitesOption{sites});
+  EXPECT_EQ(WriteConfig(ReadConfigText<SitesOption>(written, "b.yaml")), written);
 }
 
 TEST(ExtraSites, AFaultIsOneLine) {

@@ -26,7 +26,7 @@ using ::testing::HasSubstr;
 using testing::WordsOf;
 
 // A distribution of the 32 sites with the correlations of the model.
-JointNormal Sites(int sample = 0) {
+JointNormal JointSites(int sample = 0) {
   JointNormal joint{
       .names = StandardSiteCodes(), .mean = {}, .sd = {}, .correlation = {}, .sample = {}};
   const auto n = std::ssize(joint.names);
@@ -53,7 +53,7 @@ Eigen::MatrixXd Draw(const JointNormal& joint, int count, Random& random) {
 }
 
 TEST(Condition, KeepsKnownNumbers) {
-  const JointNormal joint = Sites();
+  const JointNormal joint = JointSites();
   const std::vector<KnownValue> known = {{"g", 7.25}, {"go_l", 11.5}, {"pg", 6}};
   const ConditionalNormal given = Condition(joint, known);
   for (const KnownValue& value : known) {
@@ -63,7 +63,7 @@ TEST(Condition, KeepsKnownNumbers) {
 }
 
 TEST(Condition, WithNothingKnownIsTheDistribution) {
-  const JointNormal joint = Sites();
+  const JointNormal joint = JointSites();
   const ConditionalNormal given = Condition(joint, {});
   EXPECT_TRUE(given.mean.isApprox(joint.mean));
   EXPECT_TRUE(given.sd.isApprox(joint.sd));
@@ -72,7 +72,7 @@ TEST(Condition, WithNothingKnownIsTheDistribution) {
 // The reference solution uses blocks of the precision matrix, the general inverse of the whole
 // covariance.
 TEST(Condition, AgreesWithThePrecisionMatrix) {
-  const JointNormal joint = Sites();
+  const JointNormal joint = JointSites();
   const std::vector<KnownValue> known = {{"zy_l", 9}, {"n", 5}, {"mr_r", 21}};
   const ConditionalNormal given = Condition(joint, known);
   const Eigen::MatrixXd s = joint.sd.asDiagonal() * joint.correlation * joint.sd.asDiagonal();
@@ -99,7 +99,7 @@ TEST(Condition, AgreesWithThePrecisionMatrix) {
 // A number with a huge error carries no information; one with a small error nearly as much as an
 // exact one.
 TEST(Condition, ErrorsOfKnownNumbersCount) {
-  const JointNormal joint = Sites();
+  const JointNormal joint = JointSites();
   const int at = *joint.Find("mso_l");
   const std::vector<KnownValue> exact = {{"mso_r", 20}}, unsure = {{"mso_r", 20, 1e6}},
                                 nearly = {{"mso_r", 20, 1e-3}};
@@ -110,7 +110,7 @@ TEST(Condition, ErrorsOfKnownNumbersCount) {
 
 // The distribution estimated from that many people of another distribution and the model.
 JointNormal Population(int people) {
-  JointNormal truth = Sites();
+  JointNormal truth = JointSites();
   truth.correlation =
       ModelledCorrelation({.common = 0.1, .twins = 0.1, .own = 0.2, .length_mm = 30}, truth.names);
   Random random(11);
@@ -131,7 +131,7 @@ std::vector<KnownValue> AtTheirMeans(const JointNormal& joint,
 class KnownWithErrors : public ::testing::TestWithParam<std::tuple<int, bool>> {
  protected:
   const int people_ = std::get<0>(GetParam());
-  const JointNormal joint_ = people_ > 0 ? Population(people_) : Sites();
+  const JointNormal joint_ = people_ > 0 ? Population(people_) : JointSites();
   const std::vector<std::string> names_ =
       std::get<1>(GetParam()) ? joint_.names
                               : std::vector<std::string>{"g", "pg", "zy_l", "zy_r", "go_l"};
@@ -228,7 +228,7 @@ double ShareWithin(const JointNormal& joint, const Eigen::MatrixXd& people,
 }
 
 TEST(Condition, NinetyPercentHoldIfTheCovarianceIsKnown) {
-  const JointNormal joint = Sites();
+  const JointNormal joint = JointSites();
   Random random(5);
   long counted = 0;
   const double within = ShareWithin(joint, Draw(joint, 4000, random), {"g", "pg", "zy_l"}, counted);
@@ -238,7 +238,7 @@ TEST(Condition, NinetyPercentHoldIfTheCovarianceIsKnown) {
 // With few people and no model, only the widening makes the interval hold; without it the coverage
 // would be about 76 %.
 TEST(Condition, NinetyPercentHoldWithFewPeople) {
-  JointNormal truth = Sites();
+  JointNormal truth = JointSites();
   const std::vector<Index> some = {0, 1, 5, 9, 12};
   truth.names = {"sg", "g", "pr", "me", "mso_l"};
   truth.mean = Eigen::VectorXd(truth.mean(some));
@@ -260,7 +260,7 @@ TEST(Condition, NinetyPercentHoldWithFewPeople) {
 }
 
 TEST(Condition, RefusesUnusableNumbers) {
-  const JointNormal joint = Sites();
+  const JointNormal joint = JointSites();
   const std::vector<KnownValue> strange = {{"nose", 3}}, twice = {{"g", 3}, {"g", 4}},
                                 endless = {{"g", INFINITY}};
   EXPECT_THAT(WordsOf<InputError>([&] { Condition(joint, strange); }), HasSubstr("'nose'"));

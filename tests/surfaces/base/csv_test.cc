@@ -17,7 +17,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 // The error message of reading the whole text with all cells as numbers.
-std::string FaultOf(std::string_view text) {
+std::string CsvFault(std::string_view text) {
   try {
     CsvReader csv(text, "t.csv");
     while (csv.NextRow()) {
@@ -75,16 +75,16 @@ TEST(Csv, ReadsTablesOfSpreadsheets) {
 }
 
 TEST(Csv, FaultsNameTheirLine) {
-  EXPECT_EQ(FaultOf("a,b\n1,2\n3\n"),
+  EXPECT_EQ(CsvFault("a,b\n1,2\n3\n"),
             "t.csv:3: 1 entries for 2 columns; give one entry per column");
-  EXPECT_EQ(FaultOf("a,b\n\n"), "t.csv:2: the line is empty; leave it out");
-  EXPECT_EQ(FaultOf("a,b,a\n"), "t.csv:1: the column 'a' appears twice; leave one out");
-  EXPECT_THAT(FaultOf("a\n1\n\"2\n3"), HasSubstr("t.csv:3: a quote begins here"));
-  EXPECT_THAT(FaultOf("a\n\"2\"3\n"), HasSubstr("t.csv:2: text follows a closing quote"));
+  EXPECT_EQ(CsvFault("a,b\n\n"), "t.csv:2: the line is empty; leave it out");
+  EXPECT_EQ(CsvFault("a,b,a\n"), "t.csv:1: the column 'a' appears twice; leave one out");
+  EXPECT_THAT(CsvFault("a\n1\n\"2\n3"), HasSubstr("t.csv:3: a quote begins here"));
+  EXPECT_THAT(CsvFault("a\n\"2\"3\n"), HasSubstr("t.csv:2: text follows a closing quote"));
   for (const char* bad : {"nan", "inf", "1e999", "x", "0x1", "1 2", "\"1\n2\""}) {
-    EXPECT_THAT(FaultOf(std::string("a\n1\n") + bad + "\n"), HasSubstr("t.csv:3: column 'a'"));
+    EXPECT_THAT(CsvFault(std::string("a\n1\n") + bad + "\n"), HasSubstr("t.csv:3: column 'a'"));
   }
-  EXPECT_THAT(FaultOf("a\n\"1\n\"\n"), HasSubstr("t.csv:2: column 'a'"));
+  EXPECT_THAT(CsvFault("a\n\"1\n\"\n"), HasSubstr("t.csv:2: column 'a'"));
   CsvReader reader("a,b\n", "t.csv");
   EXPECT_THROW(reader.RequireColumn("c"), IoError);
 }
@@ -96,11 +96,11 @@ TEST(Csv, ManyColumnNamesAreComparedQuickly) {
     names += ",c" + std::to_string(k);
   }
   EXPECT_EQ(CsvReader(names + "\n", "t.csv").Columns().size(), 500'001u);
-  EXPECT_EQ(FaultOf(names + ",c7\n"), "t.csv:1: the column 'c7' appears twice; leave one out");
+  EXPECT_EQ(CsvFault(names + ",c7\n"), "t.csv:1: the column 'c7' appears twice; leave one out");
 }
 
 TEST(Csv, ALineAfterABreakInACellHasItsOwnNumber) {
-  EXPECT_THAT(FaultOf("\"two\nlines\"\nx\n"), HasSubstr("t.csv:3: column 'two\nlines'"));
+  EXPECT_THAT(CsvFault("\"two\nlines\"\nx\n"), HasSubstr("t.csv:3: column 'two\nlines'"));
 }
 
 }  // namespace

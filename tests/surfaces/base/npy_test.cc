@@ -33,7 +33,7 @@ std::string Npy(const std::string& type, const std::string& shape, const std::st
   return bytes + header + data;
 }
 
-std::string FaultOf(const std::string& bytes) {
+std::string NpyFault(const std::string& bytes) {
   try {
     ParseNpy(bytes, "a.npy");
   } catch (const InputError& error) {
@@ -67,18 +67,18 @@ TEST(Npy, OrderIsTheLastIndexFastestWhateverTheFileHas) {
 }
 
 TEST(Npy, UnreadableFilesAreReported) {
-  EXPECT_THAT(FaultOf("PK\x03\x04 something else"), HasSubstr("a.npy: not a .npy file"));
-  EXPECT_THAT(FaultOf(Npy("'|O'", "(1,)", "x")), HasSubstr("'|O'"));
-  EXPECT_THAT(FaultOf(Npy("'>f8'", "(1,)", Raw<double>({1}))), HasSubstr("little-endian"));
-  EXPECT_THAT(FaultOf(Npy("[('x', '<f8')]", "(1,)", Raw<double>({1}))), HasSubstr("fields"));
-  EXPECT_THAT(FaultOf(Npy("'<f8'", "(2,)", Raw<double>({1}))), HasSubstr("there are 8"));
-  EXPECT_THAT(FaultOf(Npy("'<f8'", "(4294967296, 4294967296)", "")), HasSubstr("too large"));
-  EXPECT_THAT(FaultOf(Npy("'<f8'", "(1,)", Raw<double>({kNaN}))), HasSubstr("not finite"));
+  EXPECT_THAT(NpyFault("PK\x03\x04 something else"), HasSubstr("a.npy: not a .npy file"));
+  EXPECT_THAT(NpyFault(Npy("'|O'", "(1,)", "x")), HasSubstr("'|O'"));
+  EXPECT_THAT(NpyFault(Npy("'>f8'", "(1,)", Raw<double>({1}))), HasSubstr("little-endian"));
+  EXPECT_THAT(NpyFault(Npy("[('x', '<f8')]", "(1,)", Raw<double>({1}))), HasSubstr("fields"));
+  EXPECT_THAT(NpyFault(Npy("'<f8'", "(2,)", Raw<double>({1}))), HasSubstr("there are 8"));
+  EXPECT_THAT(NpyFault(Npy("'<f8'", "(4294967296, 4294967296)", "")), HasSubstr("too large"));
+  EXPECT_THAT(NpyFault(Npy("'<f8'", "(1,)", Raw<double>({kNaN}))), HasSubstr("not finite"));
   for (const char* wrong : {"(-1,)", "(1.0,)", "(x,)", "(0, 99999999999999999999)"}) {
-    EXPECT_THAT(FaultOf(Npy("'<f8'", wrong, Raw<double>({1}))), HasSubstr("not one of whole"));
+    EXPECT_THAT(NpyFault(Npy("'<f8'", wrong, Raw<double>({1}))), HasSubstr("not one of whole"));
   }
-  EXPECT_THAT(FaultOf(Npy("'<f8'", "()", Raw<double>({1}))), HasSubstr("no shape"));
-  EXPECT_THAT(FaultOf(Npy("'<f8'", "(1,)", Raw<double>({1})).substr(0, 30)), HasSubstr("header"));
+  EXPECT_THAT(NpyFault(Npy("'<f8'", "()", Raw<double>({1}))), HasSubstr("no shape"));
+  EXPECT_THAT(NpyFault(Npy("'<f8'", "(1,)", Raw<double>({1})).substr(0, 30)), HasSubstr("header"));
 }
 
 }  // namespace

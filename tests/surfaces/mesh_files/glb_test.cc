@@ -22,7 +22,7 @@ GlbPart Triangle1(const std::string& material) {
           .triangles = {{0, 1, 2}}};
 }
 
-struct Read {
+struct ReadGlb {
   Json json;
   std::string binary;
 };
@@ -34,7 +34,7 @@ T At(const std::string& bytes, std::size_t offset) {
   return value;
 }
 
-Read Parse(const std::string& glb) {
+ReadGlb Parse(const std::string& glb) {
   EXPECT_EQ(glb.substr(0, 4), "glTF");
   EXPECT_EQ(At<std::uint32_t>(glb, 8), glb.size());
   const std::size_t length = At<std::uint32_t>(glb, 12);
@@ -43,7 +43,7 @@ Read Parse(const std::string& glb) {
 
 // The numbers of an accessor, of type T.
 template <class T>
-std::vector<T> Numbers(const Read& read, const Json& accessor) {
+std::vector<T> Numbers(const ReadGlb& read, const Json& accessor) {
   const Json& a = read.json["accessors"][accessor.get<int>()];
   const Json& view = read.json["bufferViews"][a["bufferView"].get<int>()];
   std::vector<T> numbers(view["byteLength"].get<std::size_t>() / sizeof(T));
@@ -70,7 +70,7 @@ TEST(Glb, NodesHaveTheirNamesAndMaterials) {
 
 TEST(Glb, PointsAreInMetresWithTheFaceTowardsZ) {
   const GlbNode node{.name = "n", .parts = {Triangle1("m")}};
-  const Read read = Parse(EncodeGlb({&node, 1}));
+  const ReadGlb read = Parse(EncodeGlb({&node, 1}));
   const Json& attributes = read.json["meshes"][0]["primitives"][0]["attributes"];
   EXPECT_EQ(Numbers<float>(read, attributes["POSITION"]),
             (std::vector<float>{0, 0, 0, 1, 0, 0, 0, 3, -2}));
@@ -85,7 +85,7 @@ TEST(Glb, PointsAreInMetresWithTheFaceTowardsZ) {
 TEST(Glb, ColoursAreLinear) {
   GlbNode node{.name = "n", .parts = {Triangle1("m")}};
   node.parts[0].colours = {{0, 128, 255}, {10, 20, 30}, {0, 0, 0}};
-  const Read read = Parse(EncodeGlb({&node, 1}));
+  const ReadGlb read = Parse(EncodeGlb({&node, 1}));
   const Json& colour = read.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"];
   EXPECT_EQ(read.json["accessors"][colour.get<int>()]["normalized"], true);
   const auto shorts = Numbers<std::uint16_t>(read, colour);

@@ -26,7 +26,7 @@ double Luminance(const Colour& c) {
   return 0.2126 * LinearFromSrgb(c.r) + 0.7152 * LinearFromSrgb(c.g) + 0.0722 * LinearFromSrgb(c.b);
 }
 
-void ExpectColour(const Colour& a, const Colour& b, double tolerance) {
+void ExpectPictureColour(const Colour& a, const Colour& b, double tolerance) {
   EXPECT_NEAR(a.r, b.r, tolerance);
   EXPECT_NEAR(a.g, b.g, tolerance);
   EXPECT_NEAR(a.b, b.b, tolerance);
@@ -73,9 +73,9 @@ TEST(Image, DrawingIsClippedToThePicture) {
   FillRectangle(image, -2, -2, 3, 3, {1, 0, 0});
   Paste(image, MakeImage(5, 5, {0, 0, 1}), 3, 2);
   BlendPixel(image, 9, 9, {0, 0, 0}, 1);
-  ExpectColour(PixelAt(image, 0, 0), {1, 0, 0}, 0);
-  ExpectColour(PixelAt(image, 1, 1), {1, 1, 1}, 0);
-  ExpectColour(PixelAt(image, 3, 2), {0, 0, 1}, 0);
+  ExpectPictureColour(PixelAt(image, 0, 0), {1, 0, 0}, 0);
+  ExpectPictureColour(PixelAt(image, 1, 1), {1, 1, 1}, 0);
+  ExpectPictureColour(PixelAt(image, 3, 2), {0, 0, 1}, 0);
 }
 
 TEST(Image, PasteCopiesEachPixelAndClipsAtTheEdges) {
@@ -89,7 +89,7 @@ TEST(Image, PasteCopiesEachPixelAndClipsAtTheEdges) {
       for (int column = 0; column < image.width; ++column) {
         const bool is_covered =
             column >= x && row >= y && column < x + picture.width && row < y + picture.height;
-        ExpectColour(
+        ExpectPictureColour(
             PixelAt(image, column, row),
             is_covered ? PixelAt(picture, column - x, row - y) : PixelAt(paper, column, row), 0);
       }
@@ -99,10 +99,10 @@ TEST(Image, PasteCopiesEachPixelAndClipsAtTheEdges) {
 
 TEST(ColourMap, EndsAndBeyond) {
   const ColourMap depth = SequentialMap(2, 30);
-  ExpectColour(ColourAt(depth, 2), HexColour(0x440154), 0);
-  ExpectColour(ColourAt(depth, 30), HexColour(0xfde725), 0);
-  ExpectColour(ColourAt(depth, -1e9), ColourAt(depth, 2), 0);
-  ExpectColour(ColourAt(depth, 1e9), ColourAt(depth, 30), 0);
+  ExpectPictureColour(ColourAt(depth, 2), HexColour(0x440154), 0);
+  ExpectPictureColour(ColourAt(depth, 30), HexColour(0xfde725), 0);
+  ExpectPictureColour(ColourAt(depth, -1e9), ColourAt(depth, 2), 0);
+  ExpectPictureColour(ColourAt(depth, 1e9), ColourAt(depth, 30), 0);
 }
 
 TEST(ColourMap, SequentialLuminanceRisesAllTheWayWithoutJumps) {
@@ -129,7 +129,7 @@ TEST(ColourMap, DivergingIsWhiteAtZeroBlueBelowRedAboveAndEvenlyDark) {
 
 TEST(ColourMap, NoDataIsGreyAndNoValueHasThatGrey) {
   for (const ColourMap& map : {SequentialMap(0, 10), DivergingMap(10)}) {
-    ExpectColour(ColourAt(map, kNaN), kNoDataColour, 0);
+    ExpectPictureColour(ColourAt(map, kNaN), kNoDataColour, 0);
     EXPECT_EQ(kNoDataColour.r, kNoDataColour.g);
     EXPECT_EQ(kNoDataColour.g, kNoDataColour.b);
     for (double mm = -10; mm <= 10; mm += 0.1) {
@@ -157,7 +157,7 @@ TEST(ColourMap, StepsRunFromEndToEndAndLinesBetweenThemAreClose) {
   for (int k = 0; k < 32; ++k) {
     const auto at = [&](double step) { return ColourAt(map, -5 + 10 * step / 32); };
     const Colour a = at(k), b = at(k + 1);
-    ExpectColour(at(k + 0.5), {(a.r + b.r) / 2, (a.g + b.g) / 2, (a.b + b.b) / 2}, 0.01);
+    ExpectPictureColour(at(k + 0.5), {(a.r + b.r) / 2, (a.g + b.g) / 2, (a.b + b.b) / 2}, 0.01);
   }
 }
 

@@ -15,7 +15,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 
 // The number of elements with a name. Fails if the text is not XML.
-int Count(const std::string& svg, const char* name) {
+int CountElements(const std::string& svg, const char* name) {
   pugi::xml_document document;
   EXPECT_TRUE(document.load_string(svg.c_str()));
   int count = 0;
@@ -30,8 +30,8 @@ const std::vector<BoxRow> kRows = {
 
 TEST(BoxPlot, HasEachValueAndABoxPerRow) {
   const std::string svg = BoxPlotSvg(kRows, "rms (mm)");
-  EXPECT_EQ(Count(svg, "circle"), 6);
-  EXPECT_EQ(Count(svg, "rect"), 2 + 1);  // the paper too
+  EXPECT_EQ(CountElements(svg, "circle"), 6);
+  EXPECT_EQ(CountElements(svg, "rect"), 2 + 1);  // the paper too
 }
 
 TEST(BoxPlot, KeepsTheHeadOfEachPartOfALongLabel) {
@@ -44,7 +44,8 @@ TEST(BoxPlot, KeepsTheHeadOfEachPartOfALongLabel) {
 }
 
 TEST(CumulativePlot, HasALinePerRow) {
-  EXPECT_EQ(Count(CumulativePlotSvg(kRows, "rms (mm)"), "polyline"), 6);  // and one in the legend
+  EXPECT_EQ(CountElements(CumulativePlotSvg(kRows, "rms (mm)"), "polyline"),
+            6);  // and one in the legend
 }
 
 TEST(QuantilePlot, EndsAtTheQuantileBelowTheLargestValue) {
@@ -53,7 +54,7 @@ TEST(QuantilePlot, EndsAtTheQuantileBelowTheLargestValue) {
     quantiles.push_back(k < 20 ? 0.5 * k : 1000);
   }
   const std::string svg = QuantilePlotSvg({{"a", quantiles}}, "distance (mm)");
-  EXPECT_EQ(Count(svg, "polyline"), 2);
+  EXPECT_EQ(CountElements(svg, "polyline"), 2);
   EXPECT_THAT(svg, HasSubstr(">10<"));  // the axis: 9.5 rounded up, not 1000
   EXPECT_THAT(svg, HasSubstr("60.00,340.00 "));
   EXPECT_THAT(svg, HasSubstr("829.50,36.00 \""));  // 9.5 of 10 mm, 95 %
@@ -61,7 +62,7 @@ TEST(QuantilePlot, EndsAtTheQuantileBelowTheLargestValue) {
 
 TEST(ConvergencePlot, RunsFromStartToLastStepOnOneScale) {
   const std::string svg = ConvergencePlotSvg({{"a", {4, 2, 1}}, {"b", {3, 0}}}, "rms (mm)");
-  EXPECT_EQ(Count(svg, "polyline"), 4);
+  EXPECT_EQ(CountElements(svg, "polyline"), 4);
   // Steps are evenly spaced from the left to the right edge; 4 mm is at the top, 0 at the bottom.
   EXPECT_THAT(svg, HasSubstr("points=\"60.00,34.00 465.00,187.00 870.00,263.50 \""));
   EXPECT_THAT(svg, HasSubstr("points=\"60.00,110.50 465.00,340.00 \""));
@@ -70,7 +71,7 @@ TEST(ConvergencePlot, RunsFromStartToLastStepOnOneScale) {
 
 TEST(CalibrationPlot, CalibratedRowsLieOnTheDiagonal) {
   const std::string svg = CalibrationPlotSvg({{"true", {0.25, 0.5, 0.75}}, {"bold", {0.1}}}, "%");
-  EXPECT_EQ(Count(svg, "polyline"), 4);
+  EXPECT_EQ(CountElements(svg, "polyline"), 4);
   EXPECT_THAT(svg, HasSubstr("x1=\"60.00\" y1=\"340.00\" x2=\"870.00\" y2=\"20.00\""));
   EXPECT_THAT(svg, HasSubstr("points=\"60.00,340.00 262.50,260.00 465.00,180.00 667.50,100.00 "
                              "870.00,20.00\""));
@@ -81,7 +82,7 @@ TEST(CalibrationPlot, CalibratedRowsLieOnTheDiagonal) {
 
 TEST(Histograms, AreInProportionToEqualShares) {
   const std::string svg = HistogramsSvg({{"flat", {0.5, 0.5}}, {"to the left", {0.75, 0.25}}});
-  EXPECT_EQ(Count(svg, "rect"), 4 + 1);  // the paper too
+  EXPECT_EQ(CountElements(svg, "rect"), 4 + 1);  // the paper too
   // The tallest bar, 1.5 times the even share, is 110 pixels high.
   EXPECT_THAT(svg, HasSubstr("height=\"73.33\""));
   EXPECT_THAT(svg, HasSubstr("height=\"110.00\""));
@@ -91,10 +92,11 @@ TEST(Histograms, AreInProportionToEqualShares) {
 
 TEST(RankPlot, PutsTheBestFirst) {
   const std::string svg = RankPlotSvg({{"worse", 1.8}, {"better", 1.2}}, 0.4);
-  EXPECT_EQ(Count(svg, "circle"), 2);
+  EXPECT_EQ(CountElements(svg, "circle"), 2);
   EXPECT_LT(svg.find("better"), svg.find("worse"));
   EXPECT_EQ(
-      Count(RankPlotSvg({{"a", 1}, {"b", 2}}, std::numeric_limits<double>::quiet_NaN()), "circle"),
+      CountElements(RankPlotSvg({{"a", 1}, {"b", 2}}, std::numeric_limits<double>::quiet_NaN()),
+                    "circle"),
       2);
 }
 
@@ -106,7 +108,7 @@ TEST(TickStep, IsRound) {
 }
 
 TEST(Plots, EqualValuesGiveAPlot) {
-  EXPECT_EQ(Count(BoxPlotSvg({{"same", {2, 2, 2}}}, "x"), "circle"), 3);
+  EXPECT_EQ(CountElements(BoxPlotSvg({{"same", {2, 2, 2}}}, "x"), "circle"), 3);
   EXPECT_EQ(BoxPlotSvg({{"same", {2, 2, 2}}}, "x").find("nan"), std::string::npos);
 }
 
