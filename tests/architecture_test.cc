@@ -91,7 +91,7 @@ const std::map<std::string, std::string> kLibraryPlaces = {
     {"OpenMesh/", R"(surfaces/\w+/\w+\.cc|surfaces/mesh/half_edge_mesh\.h)"},
     {"itk", R"(problems/io/volumes/itk_files\.cc)"},
     {"gdcm", R"(problems/io/volumes/itk_files\.cc)"},
-    {"httplib", R"(problems/app/workbench/http_server\.cc)"},
+    {"httplib", R"(problems/app/workbench/http_(connections|server)\.cc)"},
     {"pybind11", R"(problems/app/python/\w+\.(h|cc))"},
 };
 

@@ -241,6 +241,7 @@ void GiveDepths(const SubjectData& data, const Experiment& experiment, const Mes
   const TriMesh* const skin = data.skin ? &*data.skin : nullptr;
   Append(subject.notes, TurnToSkin({.landmarks = data.landmarks,
                                     .skin = skin,
+                                    .bone = data.skull,
                                     .skull = query,
                                     .noise_mm = experiment.landmarks.noise_mm},
                                    all, subject.dowels_on_bone));

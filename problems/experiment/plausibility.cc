@@ -324,11 +324,12 @@ class Judge {
   }
 
   Plausibility Run() {
+    constexpr double kLeast_mm = 1;
     if (in_.face.mesh.triangles.empty() || !IsFinite()) {
-      for (PlausibilityCheck& check : result_.checks) {
-        check.sentence = "the face has no triangle, or points that are not numbers";
-      }
-      return std::move(result_);
+      return AllFailed("the face has no triangle, or points that are not numbers");
+    }
+    if (Bounds(in_.face.mesh).sizes().maxCoeff() < kLeast_mm) {
+      return AllFailed("the face is crushed to less than 1 mm");
     }
     JudgeBone();
     context_.ThrowIfStopped();
@@ -343,6 +344,13 @@ class Judge {
   }
 
  private:
+  Plausibility AllFailed(const std::string& sentence) {
+    for (PlausibilityCheck& check : result_.checks) {
+      check.sentence = sentence;
+    }
+    return std::move(result_);
+  }
+
   bool IsFinite() const {
     return std::ranges::all_of(in_.face.mesh.points, [](const Vec3& p) { return p.allFinite(); });
   }

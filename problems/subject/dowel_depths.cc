@@ -361,13 +361,24 @@ class SkinTurner {
 
   void DropIfInBone(Dowel& dowel, FillNotes& notes) {
     constexpr double kStart_mm = 1;  // beyond the roughness of bone
-    if (closest_.skull.FirstHit(dowel.base + kStart_mm * dowel.direction, dowel.direction,
-                                std::max(0.0, dowel.depth_mm - kStart_mm))) {
+    const bool crosses_bone =
+        closest_.skull
+            .FirstHit(dowel.base + kStart_mm * dowel.direction, dowel.direction,
+                      std::max(0.0, dowel.depth_mm - kStart_mm))
+            .has_value();
+    if (crosses_bone || EndsBehindBone(dowel)) {
       Drop(
           "its normal points into the skull, and without a skin the direction of its depth is "
           "not known",
           dowel, notes);
     }
+  }
+
+  // A dowel can end within solid bone without crossing a further surface.
+  bool EndsBehindBone(const Dowel& dowel) const {
+    const MeshPoint at = closest_.skull.Closest(dowel.Tip());
+    const Vec3 outward = TriangleAreaVector(closest_.bone, closest_.bone.triangles[at.triangle]);
+    return (dowel.Tip() - at.position).dot(outward) < 0;
   }
 
   static void Drop(const std::string& why, Dowel& dowel, FillNotes& notes) {

@@ -218,16 +218,17 @@ std::map<std::string, double> KnownDepths(const TissueGiven& given, const Landma
 struct ClosestSkin {
   const LandmarkFile& landmarks;
   const TriMesh* skin = nullptr;  // null: not known
-  const MeshQuery& skull;
-  double noise_mm = 0;  // by which the dowels may have been moved from their landmarks
+  const TriMesh& bone;
+  const MeshQuery& skull;  // of `bone`
+  double noise_mm = 0;     // by which the dowels may have been moved from their landmarks
   int threads = 1;
 };
 
 // A depth to the closest skin is no depth along the normal, which may point sideways or inwards.
 // Turns each dowel that has such a depth towards the closest skin that is seen from outside. Drops
 // it if that skin is not at this depth, within 3 mm and three times the noise. Without a skin a
-// dowel keeps its direction, unless it enters bone, which drops it. Notes concern `used` alone.
-// Throws InputError if no dowel is left.
+// dowel keeps its direction, unless it crosses bone or ends within it, which drops it. Notes
+// concern `used` alone. Throws InputError if no dowel is left.
 std::vector<std::string> TurnToSkin(const ClosestSkin& closest, std::vector<Dowel>& all,
                                     std::vector<Dowel>& used);
 

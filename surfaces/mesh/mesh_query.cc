@@ -98,6 +98,22 @@ Triangles CopyTriangles(const TriMesh& mesh) {
   return triangles;
 }
 
+// The largest number of triangles whose first corners are equal.
+int MostWithOneCorner(const Triangles& triangles) {
+  std::vector<QueryKernel::Point_3> corners;
+  corners.reserve(triangles.size());
+  for (const auto& triangle : triangles) {
+    corners.push_back(triangle.vertex(0));
+  }
+  std::ranges::sort(corners);
+  int most = 0, equal = 0;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    equal = k > 0 && corners[k] == corners[k - 1] ? equal + 1 : 1;
+    most = std::max(most, equal);
+  }
+  return most;
+}
+
 }  // namespace
 
 struct MeshQuery::Tree {
@@ -116,11 +132,18 @@ struct MeshQuery::Tree {
     Intersection intersection_object() const { return {*this}; }
   };
 
+  // CGAL splits the first corners of the triangles until few are left, one call deeper each time,
+  // so very many equal ones overflow the stack.
+  static constexpr int kMostWithOneCorner = 1000;
+
   explicit Tree(const TriMesh& mesh)
       : triangles(CopyTriangles(mesh)), tree(triangles.cbegin(), triangles.cend()) {
-    tree.build();
-    tree.accelerate_distance_queries();  // here, so that const queries from several threads never
-                                         // build it
+    tree.build();  // here, so that const queries from several threads never build it
+    if (MostWithOneCorner(triangles) <= kMostWithOneCorner) {
+      tree.accelerate_distance_queries();
+    } else {
+      tree.do_not_accelerate_distance_queries();
+    }
   }
   MeshPoint PointAt(const Vec3& position, const Triangles::const_iterator& triangle,
                     const Vec3& from) const {

@@ -58,11 +58,11 @@ struct Example {
 };
 
 const RunResult& GoodRun() {
-  static const RunResult run =
-      Run(ReadConfig<Experiment>(
-              SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml",
-              std::vector<std::string>{"subject.rings=40", "implicit.resolution=48"}),
-          {});
+  static const RunResult run = Run(
+      ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml",
+                             std::vector<std::string>{"subject.rings=30", "implicit.resolution=32",
+                                                      "seeds.level=0", "uncertainty.sigma=false"}),
+      {});
   return run;
 }
 
@@ -143,7 +143,8 @@ const std::vector<Mistake>& Mistakes() {
        [](Example& c) {
          c.face = Tessellate(c.surface, kFaceQuadsPerPatch);
          std::ranges::fill(c.face->mesh.points, Vec3(1, 2, 3));
-       }},
+       },
+       false},
       {"InsideTheHead", "bone_most_mm", [](Example& c) { ScaleFace(c, 0.8); }},
       {"UnderTheBone", "bone_share", [](Example& c) { ScaleFace(c, 0.93); }},
       {"FarAway", "marker_mm",

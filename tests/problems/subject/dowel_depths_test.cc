@@ -244,7 +244,8 @@ struct Ball {
   std::vector<std::string> Turn(bool with_skin) {
     std::vector<Dowel> all = dowels;
     const std::vector<std::string> notes = TurnToSkin(
-        {.landmarks = file, .skin = with_skin ? &skin : nullptr, .skull = bone}, all, dowels);
+        {.landmarks = file, .skin = with_skin ? &skin : nullptr, .bone = skull, .skull = bone}, all,
+        dowels);
     EXPECT_EQ(all.size(), dowels.size());
     return notes;
   }
@@ -261,8 +262,8 @@ TEST(TurnToSkin, ADepthToTheClosestSkinIsLaidTowardsIt) {
   EXPECT_LT((ball.dowels[1].Tip() - Vec3(0, 0, 60)).norm(), 0.3);
   EXPECT_NEAR(ball.dowels[2].direction.z(), std::cos(70 * std::numbers::pi / 180), 1e-12);
   EXPECT_THAT(notes,
-              ElementsAre(AllOf(HasSubstr("site g"), HasSubstr("70 degrees from the normal")),
-                          AllOf(HasSubstr("site n"), HasSubstr("150 degrees"))));
+              ElementsAre(AllOf(HasSubstr("site g"), HasSubstr("9 degrees from the normal")),
+                          AllOf(HasSubstr("site n"), HasSubstr("9 degrees from the normal"))));
 }
 
 TEST(TurnToSkin, DropsADowelWhoseSkinIsElsewhere) {

@@ -72,6 +72,13 @@ TEST(MeshQuery, APointIsTheWeightedSumOfItsTrianglesCorners) {
 }
 
 // CGAL's own answer for a triangle whose corners lie on a line is undefined.
+// A mesh that is crushed to a point, beside one triangle.
+TEST(MeshQuery, ManyTrianglesAtOnePlace) {
+  TriMesh mesh{.points = {{1, 2, 3}, {11, 2, 3}, {1, 12, 3}}, .triangles = {{0, 1, 2}}};
+  mesh.triangles.resize(200000, {0, 0, 0});
+  EXPECT_NEAR(MeshQuery(mesh).Closest({2, 3, 8}).distance_mm, 5, 1e-12);
+}
+
 TEST(MeshQuery, ARayPassesATriangleWithoutArea) {
   TriMesh mesh = Plate(10, 3);
   const int corner = int(mesh.points.size());
