@@ -95,6 +95,7 @@ const SemblanceGeometry = (() => {
     const mesh = new THREE.Mesh(rod(), material);
     mesh.scale.set(radius, length, radius);
     mesh.position.copy(from).addScaledVector(along, 0.5);
+    mesh.visible = length > 0;  // a rod without length has no normals
     if (length > 0) {
       mesh.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), along.divideScalar(length));
     }

@@ -483,7 +483,8 @@ TEST_F(Trust, ImportRefusesMeshesThatARunWouldRefuse) {
                                     folder_.Path().string())
                             .c_str()),
             0);
-  ExpectRefused("import-ct large.inv3 --out out --quiet", "which is not that of a head");
+  ExpectRefused("import-ct large.inv3 --out out --quiet",
+                "the head is 600 mm wide, and heads are 90 to 230 mm");
 }
 
 }  // namespace

@@ -174,6 +174,13 @@ addEventListener('load', () => setTimeout(() => {
   const canvas = document.querySelector('.view3d-stage canvas'), copy = document.createElement('canvas');
   Object.assign(copy, {width: canvas.width, height: canvas.height});
   const pen = copy.getContext('2d');
+  const due = [];  // a picture can be read only right after it was drawn
+  window.requestAnimationFrame = (draw) => { due.push(draw); return 0; };
+  const layer = document.querySelector('input[data-layer]');
+  for (let k = 0; k < 2; ++k) {
+    layer.click();
+    for (const draw of due.splice(0)) { draw(); }
+  }
   pen.drawImage(canvas, 0, 0);
   const data = pen.getImageData(0, 0, copy.width, copy.height).data;
   let red = 0;
