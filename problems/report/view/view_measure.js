@@ -250,7 +250,7 @@ class SemblanceMeasure {
   // fault: the whole fault if the mark shows one, otherwise empty.
   mark(stage, point, text, way, fault = '') {
     const group = new THREE.Group(), radius = (fault ? 0.008 : 0.004) * this.box.getSize(new THREE.Vector3()).length();
-    const material = new THREE.MeshBasicMaterial({color: fault ? 0xd00000 : 0x0b5c8f, depthTest: false});
+    const material = new THREE.MeshBasicMaterial({color: fault ? 0xd00000 : 0x0b5c8f, depthTest: false, transparent: true});  // after translucent faces
     for (const end of way.length ? [way[0], way[way.length - 1]] : [point]) {
       const ball = new THREE.Mesh(new THREE.SphereBufferGeometry(radius, 12, 8), material);
       ball.position.copy(end);

@@ -72,13 +72,13 @@ TEST_F(SkinLandmarkFiles, LandmarksOfASkullGoOutByTheirDepth) {
   const SkinLandmarks read =
       Read({File("a.yaml",
                  "landmarks:\n"
-                 "  - {site: g, point: [0, 0, 0], normal: [0, -1, 0], "
+                 "  - {site: g, point: [0, 1, 0], normal: [0, -1, 0], "
                  "depth_along_normal_mm: 5, depth_closest_mm: 4}\n"
                  "  - {site: zy_l, point: [70, 0, 0], normal: [1, 0, 0], "
                  "depth_closest_mm: 7}\n"
                  "  - {site: me, point: [0, 0, -90], normal: [0, 0, -1]}\n")});
   ASSERT_EQ(read.points.size(), 1);
-  EXPECT_EQ(read.points[0].point, Vec3(0, -5, 0));
+  EXPECT_EQ(read.points[0].point, Vec3(0, -4, 0));
   // A depth to the closest skin has no direction.
   EXPECT_THAT(read.notes, ElementsAre(AllOf(HasSubstr("zy_l"), HasSubstr("left out")),
                                       AllOf(HasSubstr("me"), HasSubstr("left out"))));
