@@ -219,7 +219,7 @@ Vec3 EstimateShift(const BoneView& view, const std::vector<double>& depth_mm) {
   return model.tail<3>();
 }
 
-// The bounds of all heads that were compared (three CTs, nine of a population, phantoms): no bone
+// The bounds of all heads that were compared (three CTs and phantoms): no bone
 // is bare; the median depth is 3 to 13 mm; the shift is -1..1, -2..1 and -12..-3 mm.
 const Vec3 kUsualShift_mm(0, -1, -5);
 constexpr double kLeastMet = 0.25, kMostBare = 0.01, kLeastMedian_mm = 1.5, kMostMedian_mm = 18;

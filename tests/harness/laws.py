@@ -248,6 +248,7 @@ class World:
         folder.mkdir()
         for name, data in head_files(head).items():
             (folder / name).write_bytes(data)
+        (self.folder / f"face{k}.ply").write_bytes(ply(read_ply(self.folder / f"skull{k}/tips.ply")))
         (folder / "case.yaml").write_bytes(case_yaml("../face.yaml"))
         (folder / "with_skin.yaml").write_bytes(case_yaml("../face.yaml", skin="skin.ply"))
         self.known["run", k] = self.call("run", f"plain{k}/case.yaml", "--out", f"plain{k}/out", *QUIET)[1]
@@ -366,7 +367,6 @@ def distance_laws(world):
         k = draw.randrange(HEADS)
         skin, face = world.heads[k].skin, read_ply(world.folder / f"skull{k}/tips.ply")
         if k not in right:
-            (world.folder / f"face{k}.ply").write_bytes(ply(face))
             printed = json.loads(world.call("evaluate", f"face{k}.ply", f"head{k}/true_skin.ply", *QUIET)[0])
             right[k] = printed["rms_mm"], printed["symmetric"]["rms_mm"]
         matrix, shift = rotation(any_direction(draw), draw.uniform(0, 180)), [draw.uniform(-300, 300) for _ in range(3)]

@@ -240,17 +240,19 @@ class SemblanceMeasure {
 
   // Marks the faults of a face, [{text, fault, place}], in red, in place of those of the face before.
   markFaults(stage, faults) {
+    const words = this.status ? this.status.textContent : '';  // of the last measurement
     for (const mark of this.marks.filter((other) => other.stage === stage && other.fault)) { this.remove(mark); }
     for (const {text, fault, place} of faults) {
       if (place) { this.mark(stage, new THREE.Vector3(...place), text, [], fault); }
     }
-    this.setStatus('');
+    this.setStatus(words);
   }
 
   // fault: the whole fault if the mark shows one, otherwise empty.
   mark(stage, point, text, way, fault = '') {
     const group = new THREE.Group(), radius = (fault ? 0.008 : 0.004) * this.box.getSize(new THREE.Vector3()).length();
-    const material = new THREE.MeshBasicMaterial({color: fault ? 0xd00000 : 0x0b5c8f, depthTest: false, transparent: true});  // after translucent faces
+    const material = new THREE.MeshBasicMaterial({color: fault ? 0xd00000 : 0x0b5c8f, depthTest: false,
+      transparent: true});  // drawn after translucent faces
     for (const end of way.length ? [way[0], way[way.length - 1]] : [point]) {
       const ball = new THREE.Mesh(new THREE.SphereBufferGeometry(radius, 12, 8), material);
       ball.position.copy(end);
