@@ -191,7 +191,7 @@ def pull_the_cheek(browser):
     browser.press("\ue00c")  # Escape
     browser.release()
     assert browser.run(POSITIONS) == before and state(browser)["edited_vertices"] == 0
-    browser.press_and_drag(start, [start[0] - 40, start[1] - 30])
+    browser.press_and_drag(start, [start[0] - 14, start[1] - 10])
     browser.wait(moved, before)
     browser.settle()
     shown, former = browser.run(POSITIONS), undo_words(browser)
@@ -326,12 +326,12 @@ def work(browser, program, config, folder, pictures):
         browser.click("[data-tool=distance]")
         for point in (points["g"], points["pg"]):
             browser.click_at(*browser.run(PLACE, *point))
-        text = browser.wait("const l = document.querySelector('.view3d-label'); return l && l.textContent")
+        text = browser.wait("const l = document.querySelector('.view3d-label:not(.fault)'); return l && l.textContent")
         straight, along = (float(number) for number in re.findall(r"([\d.]+) mm", text))
         assert 80 < straight < along < 2 * straight, text
         browser.click("[data-tool=depth]")
         browser.click_at(*browser.run(PLACE, *points["g"]))
-        text = browser.wait("const l = document.querySelectorAll('.view3d-label'); return l.length === 2 && l[1].textContent")
+        text = browser.wait("const l = document.querySelectorAll('.view3d-label:not(.fault)'); return l.length === 2 && l[1].textContent")
         found = re.search(r"depth: face ([\d.]+) mm", text)
         assert found and 1 < float(found[1]) < 15, text  # measured through the transparent face
         picture("measure")
