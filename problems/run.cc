@@ -197,10 +197,9 @@ void FaceJob::LoadTemplateAndPrior() {
 void FaceJob::MakeSubjectsFace() {
   seedable_ = SeedableFace(experiment_, skull_->cuts, skull_->implicit.dense, subject_);
   made_ = step_("fit", [&] {
-    return MakeFace(
-        {experiment_, *generic_, prior_.get(), subject_, seedable_, skull_->depth_stage->shell,
-         skull_->field.get()},
-        context_);
+    return MakeFace({experiment_, *generic_, prior_.get(), subject_, seedable_,
+                     skull_->depth_stage->shell, skull_->field.get()},
+                    context_);
   });
   NoteFace(experiment_, prior_.get(), subject_);
 }

@@ -328,10 +328,8 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
     folder.Write("report.html", FitPageHtml(options, source, result, context.threads));
   }
   folder.Write("timing.json", TimingJson(result.times));
-  folder.Write(
-      "result.json",
-      WithPlainTexts(FitResultJson(options, source, result)).dump(2) +
-          "\n");
+  folder.Write("result.json",
+               WithPlainTexts(FitResultJson(options, source, result)).dump(2) + "\n");
   return TerminalNotes(options, result, chord_mm);
 }
 

@@ -178,8 +178,9 @@ void RefuseUnknownSites(const std::set<std::string>& named, const std::string& f
                         const ExtraSites& further) {
   for (const std::string& site : named) {
     if (!IsSite(site) && !further.contains(site)) {
-      throw InputError(fmt::format("{}: areas: {} (a name of your own must stand under `sites` too)",
-                                   file, SiteFault(site)));
+      throw InputError(
+          fmt::format("{}: areas: {} (a name of your own must stand under `sites` too)", file,
+                      SiteFault(site)));
     }
   }
 }

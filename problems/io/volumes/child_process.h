@@ -15,7 +15,7 @@ namespace semblance::problems {
 using ReportFile = std::function<void(const std::string& file)>;
 
 struct ChildRights {
-  double memory_bytes = 0;                      // in addition to what this process uses now
+  double memory_bytes = 0;                           // in addition to what this process uses now
   std::vector<std::filesystem::path> readable = {};  // files, or folders with all that is in them
 };
 

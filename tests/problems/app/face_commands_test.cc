@@ -212,9 +212,9 @@ TEST_F(FaceCommands, FeatureRefusesWhatItCannotDo) {
   ExpectRefused("feature extract face.json --name 'a b' --library lib", "'a b' is not a name");
   ExpectRefused("feature extract face.json --name 'a b' --library new/lib", "'a b' is not a name");
   ExpectRefused("feature extract face.json --u 0.501 0.502 --name e --library new", "has detail");
-  ExpectRefused(fmt::format("feature extract face.json --name {} --library new/lib",
-                            std::string(300, 'n')),
-                "too long");
+  ExpectRefused(
+      fmt::format("feature extract face.json --name {} --library new/lib", std::string(300, 'n')),
+      "too long");
   ExpectRefused("feature extract face.json --name e --library face.json/lib",
                 "the folder cannot be created");
   ExpectRefused("feature extract face.json --u 0.501 0.502 --name e --library lib", "has detail");

@@ -202,7 +202,8 @@ TEST(NetworkPlan, AnUnknownSiteIsRefusedUnlessTheExperimentNamesIt) {
   NetworkPlan plan = Standard();
   std::ranges::replace(plan.areas.front(), std::string("sg"), std::string("sgg"));
   EXPECT_THAT(WordsOf<InputError>([&] { CheckNetworkSites(plan, "n.yaml", {}, {}); }),
-              ::testing::AllOf(HasSubstr("n.yaml: areas: unknown site 'sgg'"), HasSubstr("did you mean 'sg'")));
+              ::testing::AllOf(HasSubstr("n.yaml: areas: unknown site 'sgg'"),
+                               HasSubstr("did you mean 'sg'")));
   EXPECT_THAT(CheckNetworkSites(plan, "n.yaml", {}, {{"sgg", {}}}), ::testing::IsEmpty());
   std::ranges::replace(plan.areas.front(), std::string("sgg"), std::string("mmb_l"));
   EXPECT_THAT(CheckNetworkSites(plan, "n.yaml", {}, {}), ::testing::IsEmpty());
