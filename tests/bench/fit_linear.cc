@@ -103,16 +103,16 @@ double SolveDirectly(const HSplineSurface& sheet, const FitTarget& target) {
   return std::sqrt(sum / static_cast<double>(target.points.size()));
 }
 
-const std::vector<Term> kPoints = {PointTerm{}};
+const std::vector<Term> kPointTerm = {PointTerm{}};
 
 double SolveLevel(const HSplineSurface& sheet, const FitTarget& target, Solver solver) {
-  return FitLevel(ViewOf(sheet, target), kPoints, solver).summary.rms_after_mm;
+  return FitLevel(ViewOf(sheet, target), kPointTerm, solver).summary.rms_after_mm;
 }
 
 double SolveFit(const HSplineSurface& sheet, const FitTarget& target) {
   return Fit(sheet, target, {},
              {.plan = ListedPlan{.schedule = {{0, 1}}},
-              .terms = kPoints,
+              .terms = kPointTerm,
               .solver = Solver::kFastest},
              {})
       .point_rms_mm;
