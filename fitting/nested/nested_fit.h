@@ -45,6 +45,7 @@ struct AutoReport {
   double closer_noise_mm = kNaN;        // by planes through 8; smaller if detail passes for noise
   double held_out_rms_mm = kNaN;        // along one axis, of the tenth that was held out
   double neighbour_correlation = kNaN;  // of residuals of consecutive points on the curve
+  double effective_share = 1;           // independent points per point, by correlated residuals
   bool weighted = false;                // the points' weights differ
   bool met_to_rounding = false;         // held-out points are met to 1e-8 of the extent
   bool limited_by_density = false;      // finer vertices would have too few points

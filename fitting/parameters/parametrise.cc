@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <utility>
 
 #include "fitting/parameters/point_map.h"
@@ -115,6 +116,37 @@ void CheckMeaning(const Scan& scan, FoldRule folds) {
   }
 }
 
+// Returns whether u and v are linear in x and y, up to the rounding of a file with ten digits.
+bool AreLinearInXy(const Scan& scan) {
+  constexpr double kRounding = 1e-9;
+  Mat3 normal = Mat3::Zero();
+  Eigen::Matrix<double, 3, 2> right = Eigen::Matrix<double, 3, 2>::Zero();
+  Box3 box;
+  for (const Vec3& p : scan.positions) {
+    box.extend(p);
+  }
+  const Vec3 sizes = box.sizes();
+  const auto row_of = [&](const Vec3& p) {
+    return Vec3(1, (p.x() - box.min().x()) / sizes.x(), (p.y() - box.min().y()) / sizes.y());
+  };
+  if (!(sizes.x() > 0 && sizes.y() > 0)) {
+    return false;
+  }
+  for (std::size_t k = 0; k < scan.positions.size(); ++k) {
+    const Vec3 row = row_of(scan.positions[k]);
+    normal += row * row.transpose();
+    right += row * scan.given_uv[k].transpose();
+  }
+  const Eigen::Matrix<double, 3, 2> x = normal.fullPivLu().solve(right);
+  for (std::size_t k = 0; k < scan.positions.size(); ++k) {
+    const Vec2 off = x.transpose() * row_of(scan.positions[k]) - scan.given_uv[k];
+    if (!(off.cwiseAbs().maxCoeff() < kRounding)) {
+      return false;
+    }
+  }
+  return std::abs(x.bottomRows<2>().determinant()) > kRounding;
+}
+
 Parametrisation ParametriseBy(Scan scan, const GivenParameters& given) {
   if (scan.given_uv.empty()) {
     FailParameters(
@@ -130,7 +162,10 @@ Parametrisation ParametriseBy(Scan scan, const GivenParameters& given) {
   }
   CheckSpread(scan.given_uv);
   CheckMeaning(scan, given.folds);
-  return {.uv = std::move(scan.given_uv), .source = ParameterSource::kGiven};
+  const bool is_graph = scan.closure == Closure::kOpen && AreLinearInXy(scan);
+  return {.uv = std::move(scan.given_uv),
+          .source = ParameterSource::kGiven,
+          .is_graph = is_graph};
 }
 
 // ----------------------------------------------------------- plane, cylinder, mesh
@@ -139,6 +174,7 @@ struct CheckedMap {
   PointMap map;
   MapFaults faults;
   std::string looked_at;  // all maps among which it was chosen, with their faults; for messages
+  bool is_graph = false;  // of heights over x and y
 };
 
 // Root mean squares of the heights over a plane and of the places along its wider direction.
@@ -167,15 +203,13 @@ std::vector<Vec3> WithHeights(const Scan& scan, const PointMap& map, double fact
   return positions;
 }
 
-// The larger share of each fault, by the points and by the triangles if there are any. Heights that
-// spread more than the plane are reduced to its spread: they may have another unit.
-MapFaults FindFaults(const Scan& scan, const PointMap& map) {
+// The larger share of each fault, by the points and by the triangles if there are any.
+// height_factor: of the heights over a plane; 1 leaves them as they are.
+MapFaults FindFaults(const Scan& scan, const PointMap& map, double height_factor) {
   const std::vector<Vec2> in_mm = map.goes_round ? map.InMm() : std::vector<Vec2>();
-  const PlaneSpreads spreads = MeasureSpreads(scan, map);
-  const std::vector<Vec3> lower = spreads.height_mm > spreads.place_mm
-                                      ? WithHeights(scan, map, spreads.place_mm / spreads.height_mm)
-                                      : std::vector<Vec3>();
-  const PlaneMap plane{lower.empty() ? scan.positions : lower, map.goes_round ? in_mm : map.at,
+  const std::vector<Vec3> scaled =
+      height_factor == 1 ? std::vector<Vec3>() : WithHeights(scan, map, height_factor);
+  const PlaneMap plane{scaled.empty() ? scan.positions : scaled, map.goes_round ? in_mm : map.at,
                        map.Period_mm()};
   const MapFaults by_points = FaultsOfPoints(plane);
   if (scan.triangles.empty()) {
@@ -189,6 +223,15 @@ MapFaults FindFaults(const Scan& scan, const PointMap& map) {
   return {.folded = std::max(by_points.folded, by_triangles.folded),
           .collapsed = std::max(by_points.collapsed, by_triangles.collapsed),
           .mirrored = by_triangles.mirrored};
+}
+
+// The same. Heights that spread more than the plane are reduced to its spread: they may have another
+// unit.
+MapFaults FindFaults(const Scan& scan, const PointMap& map) {
+  const PlaneSpreads spreads = MeasureSpreads(scan, map);
+  return FindFaults(
+      scan, map,
+      spreads.height_mm > spreads.place_mm ? spreads.place_mm / spreads.height_mm : 1);
 }
 
 // The first map with next to no faults, or else the one with the fewest.
@@ -211,7 +254,7 @@ CheckedMap BestMap(const Scan& scan, const MapChoice& choice) {
 }
 
 bool MayBeTaken(const CheckedMap& map, FoldRule folds) {
-  return folds == FoldRule::kAccept || map.faults.Sum() <= kMostFaults;
+  return map.is_graph || folds == FoldRule::kAccept || map.faults.Sum() <= kMostFaults;
 }
 
 // Brings one coordinate to 0..1. Returns its extent.
@@ -235,6 +278,7 @@ double Normalise(int coordinate, std::vector<Vec2>& uv) {
 
 Parametrisation Take(CheckedMap checked, ParameterSource source) {
   PointMap& map = checked.map;
+  const bool is_graph = map.normal.x() == 0 && map.normal.y() == 0 && map.normal.z() != 0;
   for (Vec2& p : map.at) {
     p.x() = map.goes_round ? std::clamp(p.x(), 0.0, 1.0) : p.x();
     p.y() *= checked.faults.mirrored ? -1 : 1;  // so that du x dv faces as the triangles do
@@ -248,7 +292,8 @@ Parametrisation Take(CheckedMap checked, ParameterSource source) {
           .source = source,
           .how = std::move(map.how),
           .faults = checked.faults,
-          .lengths_mm = lengths_mm};
+          .lengths_mm = lengths_mm,
+          .is_graph = is_graph};
 }
 
 [[noreturn]] void RefusePlanes(const CheckedMap& planes) {
@@ -306,8 +351,56 @@ CheckedMap PlaneWithHeights(const Scan& scan, const MapChoice& planes, CheckedMa
   return best;
 }
 
+// Returns whether x and y spread over an area.
+bool SpreadOverXy(std::span<const Vec3> positions) {
+  constexpr double kOnLine = 1e-12;  // share of the product of the variances, above round-off
+  const Vec3 origin = positions[0];
+  Vec2 mean = Vec2::Zero();
+  for (const Vec3& p : positions) {
+    mean += (p - origin).head<2>() / static_cast<double>(positions.size());
+  }
+  Eigen::Matrix2d moments = Eigen::Matrix2d::Zero();
+  for (const Vec3& p : positions) {
+    const Vec2 off = (p - origin).head<2>() - mean;
+    moments += off * off.transpose();
+  }
+  return moments.determinant() > kOnLine * moments(0, 0) * moments(1, 1);
+}
+
+// The plane across z, if the points are heights over x and y: neighbours over x and y have similar
+// heights, and next to none of them fold. Heights count by their shape alone. Names of columns that
+// mean a map need less evidence.
+std::optional<CheckedMap> HeightsOverXy(const Scan& scan, const MapChoice& planes) {
+  // Trades noise as large as the relief (0.5), which passes, for shells and solids (0.8 to 1), which
+  // do not.
+  constexpr double kMostScatter = 0.7;
+  // Spread of the heights relative to the places. Higher values find closer sheets, and more folds
+  // in rough terrain where there are none.
+  constexpr double kHeightShare = 0.35;
+  constexpr double kMostFaultsOfMap = 0.1;
+  constexpr int kAcrossZ = 1;
+  if (!SpreadOverXy(scan.positions)) {
+    return std::nullopt;
+  }
+  CheckedMap map{.map = planes.make(kAcrossZ), .faults = {}, .looked_at = {}, .is_graph = true};
+  const PlaneSpreads spreads = MeasureSpreads(scan, map.map);
+  const double factor =
+      spreads.height_mm > 0 ? kHeightShare * spreads.place_mm / spreads.height_mm : 1;
+  map.faults = FindFaults(scan, map.map, factor);
+  const bool is_found =
+      scan.has_map_columns
+          ? map.faults.Sum() <= kMostFaultsOfMap
+          : map.faults.Sum() <= kMostFaults && HeightScatter(scan, map.map) <= kMostScatter;
+  return is_found ? std::optional(std::move(map)) : std::nullopt;
+}
+
 CheckedMap BestPlane(const Scan& scan, const PlaneParameters& plane) {
   const MapChoice planes = PlanesOver(scan.positions, Vec3(plane.normal.data()));
+  if (planes.count > 1) {
+    if (std::optional<CheckedMap> graph = HeightsOverXy(scan, planes)) {
+      return std::move(*graph);
+    }
+  }
   CheckedMap best = BestMap(scan, planes);
   if (planes.count > 1 && IsCloud(scan, best.map)) {
     best = PlaneWithHeights(scan, planes, std::move(best));

@@ -51,9 +51,10 @@ void Fields(Visitor& visit, GivenParameters& o) {
         o.folds);
 }
 
-// Orthogonal projection on a plane, for height fields in any pose. On a given normal's plane u runs
-// along the coordinate axis that is nearest to the plane (the first of equals); on the plane of
-// least squares u runs along its longest direction.
+// Orthogonal projection on a plane: along z, if the points are heights over x and y, and otherwise on
+// the plane of least squares, for height fields in any pose. On a given normal's plane u runs along
+// the coordinate axis that is nearest to the plane (the first of equals); on the plane of least
+// squares u runs along its longest direction.
 struct PlaneParameters {
   static constexpr std::string_view kName = "plane";
   std::array<double, 3> normal = {0, 0, 0};
@@ -63,8 +64,9 @@ template <class Visitor>
 void Fields(Visitor& visit, PlaneParameters& o) {
   visit(FieldInfo{.name = "normal",
                   .doc = "direction of the heights, such as [0, 0, 1] for a terrain; [0, 0, 0] "
-                         "takes the direction in which the points spread least, or, where they "
-                         "fold over its plane, the best of that, z, y and x"},
+                         "takes z, unless the points fold over x and y, then the direction in "
+                         "which they spread least, or, where they fold over its plane, the best of "
+                         "that, y and x"},
         o.normal);
   FoldField(visit, o.folds);
 }
@@ -124,6 +126,7 @@ struct Scan {
   std::span<const Triangle> triangles = {};  // between the points, or none
   Closure closure = Closure::kOpen;          // of the wanted surface
   PointNames name_of = {};
+  bool has_map_columns = false;  // named as a map's: z is a height
 };
 
 enum class ParameterSource { kGiven, kPlane, kCylinder, kMesh };
@@ -137,11 +140,15 @@ struct Parametrisation {
   std::string how = {};                    // the plane, axis or map in words; empty for given (u,v)
   MapFaults faults = {};                   // of the map; none for given (u,v)
   Vec2 lengths_mm = Vec2::Constant(kNaN);  // of the domain on a plane or a mesh that is laid out
+  // u and v are linear in x and y: the points are heights z over x and y, whose unit may differ.
+  bool is_graph = false;
 };
 
 // Finds (u,v) and checks once, at the end, that they are one-to-one (fold_check.h): at most 2 % of
-// the points may fold or collapse, except where folds are accepted. Heights over a plane across a
-// given normal or an axis that spread more than the plane count by their shape, not their unit.
+// the points may fold or collapse, except where folds are accepted. Without a normal the plane
+// across z comes first. Its heights are judged by their shape alone, so that their unit has no
+// effect. Heights over a plane across a given normal or another axis that spread more than the
+// plane count by their shape too.
 // Given (u,v) may have errors; they are refused where they have nothing to do with the points, lie
 // on a line, or bring several sheets to one place. du x dv faces the same way as the triangles, if
 // there are any. Throws InputError for no points, a corner of a triangle that is no point, `given`

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "fitting/fit.h"
+#include "problems/points/height_field.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline_query/tessellate.h"
@@ -136,16 +137,42 @@ void CheckChord(const AutoOr<double>& chord_mm, const HSplineSurface& start,
   RefuseBelow(least_mm, chord_mm.value);
 }
 
-double ChooseChord(const HSplineSurface& surface, const AutoOr<double>& chord_mm) {
+namespace {
+
+// The surface in the coordinates of the fit, in which heights and places have about one size.
+HSplineSurface SurfaceOfFit(const PointFit& result) {
+  return result.height_factor == 1 ? result.fit.surface
+                                   : WithScaledHeights(result.fit.surface, result.height_factor);
+}
+
+// Brings triangles from the coordinates of the fit to those of the points.
+void ScaleBack(double factor, Tessellation& tessellation) {
+  ScaleHeights(1 / factor, tessellation.mesh.points);
+  for (Vec3& normal : tessellation.normals) {
+    normal = normal.cwiseProduct(Vec3(1, 1, factor)).normalized();
+  }
+}
+
+}  // namespace
+
+double ChooseChord(const PointFit& result, const AutoOr<double>& chord_mm) {
   constexpr double kEnough = 500'000;  // cells: a million triangles
-  return chord_mm.automatic
-             ? AffordableChord(surface, BoxDiagonal(surface.Net(0).vertices) / kChordsPerExtent,
-                               kEnough)
-             : AffordableChord(surface, chord_mm, kMaxCells / 4);
+  const HSplineSurface surface = SurfaceOfFit(result);
+  const double factor = result.height_factor;
+  const double chord =
+      chord_mm.automatic
+          ? AffordableChord(surface, BoxDiagonal(surface.Net(0).vertices) / kChordsPerExtent,
+                            kEnough)
+          : AffordableChord(surface, factor * chord_mm.value, kMaxCells / 4);
+  return chord / factor;
 }
 
 std::string SurfacePly(const PointFit& result, double chord_mm, int threads) {
-  Tessellation tessellation = TessellateToChord(result.fit.surface, chord_mm, threads);
+  const double factor = result.height_factor;
+  Tessellation tessellation = TessellateToChord(SurfaceOfFit(result), factor * chord_mm, threads);
+  if (factor != 1) {
+    ScaleBack(factor, tessellation);
+  }
   MeshAttributes attributes = AttributesAt(result, tessellation.uv, threads);
   attributes.normals = std::move(tessellation.normals);
   return EncodeMesh(tessellation.mesh, ".ply", attributes, chord_mm);
@@ -177,6 +204,9 @@ std::vector<std::string> ColumnNames(const ResidualColumns& columns, bool outlie
   if (outliers) {
     names.emplace_back("outlier");
   }
+  if (!columns.weights.empty()) {
+    names.emplace_back("weight");
+  }
   if (!columns.sigma_mm.empty()) {
     names.emplace_back("sigma_mm");
   }
@@ -198,6 +228,9 @@ std::string ResidualsCsv(const ResidualColumns& columns) {
     if (!outlier.empty()) {
       csv.Add(int{outlier[k]});
     }
+    if (!columns.weights.empty()) {
+      csv.Add(columns.weights[k]);
+    }
     if (!columns.sigma_mm.empty()) {
       csv.Add(columns.sigma_mm[k]);
     }
@@ -216,6 +249,7 @@ std::string ResidualsPly(const ResidualColumns& columns) {
       "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float "
       "y\nproperty float z\nproperty float residual_mm\nproperty float outlier\n",
       fit.uv.size());
+  bytes += columns.weights.empty() ? "" : "property float weight\n";
   bytes += columns.sigma_mm.empty() ? "" : "property float sigma_mm\n";
   for (const PointAttribute& attribute : columns.attributes) {
     bytes += fmt::format("property float {0}\nproperty float {0}_residual\n", attribute.name);
@@ -228,6 +262,9 @@ std::string ResidualsPly(const ResidualColumns& columns) {
     AppendFloat(0, bytes);
     AppendFloat(fit.residual_mm[k], bytes);
     AppendFloat(outlier.empty() ? 0 : outlier[k], bytes);
+    if (!columns.weights.empty()) {
+      AppendFloat(columns.weights[k], bytes);
+    }
     if (!columns.sigma_mm.empty()) {
       AppendFloat(columns.sigma_mm[k], bytes);
     }

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <set>
 
 #include "surfaces/base/parallel.h"
@@ -66,9 +65,13 @@ void AddSquares(const FitResult& fit, FitGrid& grid) {
 }  // namespace
 
 DistanceQuantiles ComputeQuantiles(const FitResult& fit) {
+  const std::vector<char> counted = CountedPoints(fit);
   std::vector<double> known;
-  std::ranges::copy_if(fit.residual_mm, std::back_inserter(known),
-                       [](double v) { return std::isfinite(v); });
+  for (std::size_t k = 0; k < counted.size(); ++k) {
+    if (counted[k] != 0 && std::isfinite(fit.residual_mm[k])) {
+      known.push_back(fit.residual_mm[k]);
+    }
+  }
   if (known.empty()) {
     return {};
   }
@@ -184,21 +187,25 @@ ToleranceReport CompareWithTolerance(const FitResult& fit, const AdaptivePlan& p
   return report;
 }
 
-std::string ToleranceText(const ToleranceReport& r) {
+std::string LengthText(double length_mm, std::string_view unit, int digits) {
+  return fmt::format("{:.{}g}{}{}", length_mm, digits, unit.empty() ? "" : " ", unit);
+}
+
+std::string ToleranceText(const ToleranceReport& r, std::string_view unit) {
   const std::string own = r.regions == 0
                               ? ""
                               : fmt::format(" (or that of {}, where one holds a point)",
                                             r.regions == 1 ? "the region" : "the regions");
   if (r.Met()) {
     return fmt::format(
-        "the tolerance of {:.4g} mm{} is met: every one of {} points is within {:.4g} mm",
-        r.tolerance_mm, own, r.points, r.largest_mm);
+        "the tolerance of {}{} is met: every one of {} points is within {}",
+        LengthText(r.tolerance_mm, unit), own, r.points, LengthText(r.largest_mm, unit));
   }
   std::string text = fmt::format(
-      "THE TOLERANCE WAS MISSED: {} of {} points ({:.3g} %) are farther off than {:.4g} mm{}, "
-      "the farthest {:.4g} mm; they lie in {} {}",
-      r.beyond, r.points, 100.0 * r.beyond / r.points, r.tolerance_mm, own, r.largest_mm, r.cells,
-      r.cells == 1 ? "cell" : "cells");
+      "THE TOLERANCE WAS MISSED: {} of {} points ({:.3g} %) are farther off than {}{}, "
+      "the farthest {}; they lie in {} {}",
+      r.beyond, r.points, 100.0 * r.beyond / r.points, LengthText(r.tolerance_mm, unit), own,
+      LengthText(r.largest_mm, unit), r.cells, r.cells == 1 ? "cell" : "cells");
   if (r.at_finest > 0) {
     text +=
         fmt::format("; {} of the finest level that was allowed: a higher fit.plan.finest may help",

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "fitting/plan/fit_result.h"
@@ -13,7 +14,7 @@
 
 namespace semblance::problems {
 
-// Quantiles of the points' distances, outliers included (surfaces/base/quantile.h).
+// Quantiles of the points' distances, outliers apart (surfaces/base/quantile.h).
 struct DistanceQuantiles {
   double median_mm = kNaN, p95_mm = kNaN, max_mm = kNaN;
 };
@@ -53,7 +54,11 @@ struct ToleranceReport {
 };
 ToleranceReport CompareWithTolerance(const FitResult& fit, const AdaptivePlan& plan);
 
-// States in one sentence that the tolerance is met, or by how much and why it was missed.
-std::string ToleranceText(const ToleranceReport& report);
+// States in one sentence that the tolerance is met, or by how much and why it was missed. unit: of
+// lengths, or empty.
+std::string ToleranceText(const ToleranceReport& report, std::string_view unit = "");
+
+// A length with four digits and its unit, if that is known.
+std::string LengthText(double length_mm, std::string_view unit, int digits = 4);
 
 }  // namespace semblance::problems

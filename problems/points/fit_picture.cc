@@ -136,8 +136,8 @@ ColourMap DistanceColours(const FitGrid& grid) {
   return SequentialMap(0, high > 0 ? high : 1);
 }
 
-Legend DistanceLegend(const FitGrid& grid) {
-  return {.map = DistanceColours(grid), .title = "distance of the points"};
+Legend DistanceLegend(const FitGrid& grid, const std::string& unit) {
+  return {.map = DistanceColours(grid), .title = "distance of the points", .unit = unit};
 }
 
 std::string SurfacePng(const FitGrid& fine, int threads) {
@@ -180,7 +180,7 @@ ShownGrid ShownOf(const FitGrid& grid) {
 
 }  // namespace
 
-std::string FitScene(const FitGrid& grid) {
+std::string FitScene(const FitGrid& grid, const std::string& unit) {
   const ColourMap map = DistanceColours(grid);
   const double scale = map.high_mm / 100;  // what is written has whole hundredths
   ShownGrid shown = ShownOf(grid);
@@ -192,10 +192,12 @@ std::string FitScene(const FitGrid& grid) {
   Json scene = {
       {"label", "surface"},
       {"facts", Json::array()},
+      {"unit", unit},
       {"axes", {"+x", "\u2212x", "+y", "\u2212y", "+z", "\u2212z"}},
       {"maps",
        {{"distance",
          {{"title", "distance of the points"},
+           {"unit", unit},
           {"low_mm", 0},
           {"high_mm", 100},
           {"scale", scale},

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "fitting/plan/alone_fit.h"
 #include "fitting/plan/fit_check.h"
 #include "problems/config/config.h"
 #include "problems/config/terminal_text.h"
@@ -88,6 +89,7 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"stretch", r.stretch},
                {"direction_deg", r.direction_deg},
                {"neighbour_correlation", r.neighbour_correlation},
+               {"effective_share", r.effective_share},
                {"met_to_rounding", r.met_to_rounding},
                {"limited_by_density", r.limited_by_density},
                {"verdict", Verdict(r)},
@@ -103,8 +105,8 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
   return json;
 }
 
-std::string AutoText(const AutoReport& r) {
-  std::string text = fmt::format("noise {:.3g} mm per coordinate{}", r.noise_mm,
+std::string AutoText(const AutoReport& r, std::string_view unit) {
+  std::string text = fmt::format("noise {} per coordinate{}", LengthText(r.noise_mm, unit, 3),
                                  r.weighted ? " of a point of mean weight" : "");
   if (std::isfinite(r.neighbour_noise_mm)) {  // few points have no neighbours to compare
     text += fmt::format(" (between neighbours {:.3g})", r.neighbour_noise_mm);
@@ -128,15 +130,16 @@ std::string AutoText(const AutoReport& r) {
   return text + Verdict(r) + "\n";
 }
 
-std::string MovesText(const FootMoves& moves) {
+std::string MovesText(const FootMoves& moves, std::string_view unit) {
   if (moves.rounds == 0) {
     return "(u,v) stay as they are: moving them brings the points no nearer to a coarse surface";
   }
   std::string text = fmt::format(
-      "(u,v) moved in {}: RMS {:.4g} mm, at most {:.4g} mm; the points' RMS distance from a coarse "
-      "surface fell from {:.4g} to {:.4g} mm",
-      moves.rounds == 1 ? "1 round" : fmt::format("{} rounds", moves.rounds), moves.rms_move_mm,
-      moves.max_move_mm, moves.rms_before_mm, moves.rms_after_mm);
+      "(u,v) moved in {}: RMS {}, at most {}; the points' RMS distance from a coarse surface fell "
+      "from {} to {}",
+      moves.rounds == 1 ? "1 round" : fmt::format("{} rounds", moves.rounds),
+      LengthText(moves.rms_move_mm, unit), LengthText(moves.max_move_mm, unit),
+      LengthText(moves.rms_before_mm, unit), LengthText(moves.rms_after_mm, unit));
   if (moves.folds_prevented > 0) {
     text += fmt::format("; {} of the triangles were kept from turning over", moves.folds_prevented);
   }
@@ -210,7 +213,11 @@ Json FiguresJson(const PointFitOptions& options, const PointSource& source,
           {"points_sha256", source.sha256},
           {"points", result.fit.residual_mm.size()},
           {"parameters", result.parameters},
+          {"unit", result.unit.empty() ? Json(nullptr) : Json(result.unit)},
+          {"heights_over_xy", result.is_graph},
+          {"height_factor", result.height_factor},
           {"rms_mm", result.fit.point_rms_mm},
+          {"rms_of_all_mm", result.rms_of_all_mm},
           {"median_mm", result.distance.median_mm},
           {"p95_mm", result.distance.p95_mm},
           {"max_mm", result.distance.max_mm},
@@ -245,6 +252,9 @@ Json FitResultJson(const PointFitOptions& options, const PointSource& source,
   }
   if (result.fit.automatic) {
     json["automatic"] = AutoJson(*result.fit.automatic);
+    if (IsAlone(options.fit)) {
+      json["automatic"]["energy_weight"] = result.energy_weight;
+    }
   }
   if (const auto tolerance = CompareWithTolerance(options, result)) {
     json["tolerance"] = ToleranceJson(*tolerance);
@@ -256,7 +266,7 @@ Json FitResultJson(const PointFitOptions& options, const PointSource& source,
 void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& folder) {
   constexpr std::size_t kMostAsText = 100'000;  // documented with the option `residuals`
   const ResidualColumns columns{result.fit, result.attributes, result.attribute_at,
-                                result.sigma_mm};
+                                result.sigma_mm, result.weights};
   if (kind == ResidualFile::kAuto) {
     kind = result.fit.residual_mm.size() <= kMostAsText ? ResidualFile::kCsv : ResidualFile::kPly;
   }
@@ -281,15 +291,15 @@ std::vector<std::string> TerminalNotes(const PointFitOptions& options, const Poi
   std::vector<std::string> notes = result.notes;
   if (std::isfinite(result.weighted_rms_mm)) {
     notes.push_back(
-        fmt::format("weighted RMS {:.4g} mm: points count by their weights, as in the "
-                    "fit; in the RMS they all count alike",
-                    result.weighted_rms_mm));
+        fmt::format("weighted RMS {}: points count by their weights, as in the fit; in the RMS they "
+                    "all count alike",
+                    LengthText(result.weighted_rms_mm, result.unit)));
   }
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));
   }
   if (result.moves) {
-    notes.push_back(MovesText(*result.moves));
+    notes.push_back(MovesText(*result.moves, result.unit));
   }
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
     notes.push_back(fmt::format("{}: RMS {:.4g}", result.attributes[k].name,
@@ -304,8 +314,8 @@ std::vector<std::string> TerminalNotes(const PointFitOptions& options, const Poi
   }
   if (!options.chord_mm.automatic && chord_mm > options.chord_mm.value) {
     notes.push_back(fmt::format(
-        "surface.ply is within {:.3g} mm of the surface; {} mm would need too many triangles",
-        chord_mm, options.chord_mm.value));
+        "surface.ply is within {} of the surface; {} would need too many triangles",
+        LengthText(chord_mm, result.unit, 3), LengthText(options.chord_mm.value, result.unit)));
   }
   return notes;
 }
@@ -317,7 +327,7 @@ std::vector<std::string> WritePointFit(const PointFitOptions& options, const Poi
                                        const RunContext& context) {
   context.Report("write");
   // The mesh comes first, because it can still be refused.
-  const double chord_mm = ChooseChord(result.fit.surface, options.chord_mm);
+  const double chord_mm = ChooseChord(result, options.chord_mm);
   const std::string ply = SurfacePly(result, chord_mm, context.threads);
   folder.Write("resolved.yaml", WriteConfig(options));
   folder.Write("surface.hspline.json", HSplineToJson(result.fit.surface));

@@ -18,11 +18,12 @@ namespace semblance::problems {
 
 nlohmann::ordered_json AutoJson(const AutoReport& report);
 
-// Returns a few lines about noise, outliers, and whether denser points would show more detail.
-std::string AutoText(const AutoReport& report);
+// Returns a few lines about noise, outliers, and whether denser points would show more detail. unit:
+// of lengths, or empty.
+std::string AutoText(const AutoReport& report, std::string_view unit = "");
 
 // Returns a sentence about the moves of (u,v) before the fit.
-std::string MovesText(const FootMoves& moves);
+std::string MovesText(const FootMoves& moves, std::string_view unit = "");
 
 // The files that WritePointFit may write (given_files.h).
 inline constexpr std::array<std::string_view, 9> kPointFitFiles = {

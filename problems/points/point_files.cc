@@ -148,18 +148,26 @@ std::string WithoutSemicolons(std::string_view text) {
   return table;
 }
 
+// A table with semicolons or blanks between the entries, with commas in their place; nothing for a
+// table with commas.
+std::optional<std::string> AsCommaTable(const std::string& text) {
+  const std::string_view first = FirstLine(text);
+  if (first.find(',') != first.npos) {
+    return std::nullopt;
+  }
+  if (first.find(';') != first.npos) {
+    return WithoutSemicolons(text);
+  }
+  return NamesColumns(first) ? std::optional(WithCommas(text)) : std::nullopt;
+}
+
 // Reads a table with commas, semicolons or blanks between the entries. Without commas every named
 // column is allowed, because other programs write such tables.
 PointTable ParseTable(const std::string& text, const std::string& name,
                       std::span<const std::string> attributes) {
-  const std::string_view first = FirstLine(text);
-  if (first.find(';') != first.npos && first.find(',') == first.npos) {
-    return ParsePointTable(WithoutSemicolons(text), name, attributes, FurtherColumns::kAny);
-  }
-  if (NamesColumns(first) && first.find(',') == first.npos) {
-    return ParsePointTable(WithCommas(text), name, attributes, FurtherColumns::kAny);
-  }
-  return ParsePointTable(text, name, attributes);
+  const std::optional<std::string> table = AsCommaTable(text);
+  return table ? ParsePointTable(*table, name, attributes, FurtherColumns::kAny)
+               : ParsePointTable(text, name, attributes);
 }
 
 // Reads the points with all their digits, and the faces, if there are any, as triangles.
@@ -540,6 +548,28 @@ PointFile ReadPointFile(const std::filesystem::path& path,
   CheckReach(file.points);
   WeldCorners(file.points);
   return file;
+}
+
+std::vector<Vec2> ReadPlaces(const std::filesystem::path& path) {
+  const bool piped = path == "-", zipped = LowerCase(path.extension().string()) == ".gz";
+  std::string bytes =
+      piped ? std::string(std::istreambuf_iterator<char>(std::cin), {}) : ReadFileBytes(path);
+  const std::string name = piped ? "standard input" : path.string();
+  bytes = zipped ? Unzipped(bytes, name) : piped ? PipedText(std::move(bytes)) : std::move(bytes);
+  if (const auto inner = zipped ? path.stem() : path; LowerCase(inner.extension()) == ".npy") {
+    const NpyArray array = ParseNpy(bytes, name);
+    const std::size_t columns = array.shape.size() == 2 ? array.shape[1] : 0;
+    if (columns < 2) {
+      throw InputError(fmt::format("{}: the array is not n x 2 (x, y) or wider", name));
+    }
+    std::vector<Vec2> places;
+    for (std::size_t k = 0; k < array.values.size(); k += columns) {
+      places.emplace_back(array.values[k], array.values[k + 1]);
+    }
+    return places;
+  }
+  const std::optional<std::string> table = AsCommaTable(bytes);
+  return ParsePlaces(table ? *table : bytes, name);
 }
 
 }  // namespace semblance::problems

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "problems/points/point_table.h"
 
@@ -35,5 +36,10 @@ struct PointFile {
 // for contents that do not fit the format.
 PointFile ReadPointFile(const std::filesystem::path& path,
                         std::span<const std::string> attributes = {});
+
+// Reads places: a table with columns x and y (or lon, lat and so on, as of points), with commas,
+// semicolons or blanks between the entries, or the first two columns of a .npy; each may end in
+// .gz; "-" is a table on standard input. Other columns have no effect. Throws as ReadPointFile.
+std::vector<Vec2> ReadPlaces(const std::filesystem::path& path);
 
 }  // namespace semblance::problems

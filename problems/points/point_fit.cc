@@ -19,6 +19,7 @@
 #include "fitting/problem/start_surface.h"
 #include "fitting/solve/auto_weight.h"
 #include "problems/points/fit_files.h"
+#include "problems/points/height_field.h"
 #include "problems/report/plain_names.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
@@ -188,7 +189,8 @@ Parametrisation FindParameters(PointTable& table, std::span<const Triangle> tria
                       .given_uv = std::exchange(table.uv, {}),
                       .triangles = triangles,
                       .closure = options.closure,
-                      .name_of = name_of},
+                      .name_of = name_of,
+                      .has_map_columns = table.has_map_columns},
                      options.parameters);
 }
 
@@ -250,12 +252,18 @@ std::size_t FindFew(const Along& along, double widest) {
 }
 
 // Finds points far beyond all others along a coordinate axis. They would squeeze the others into a
-// corner of (u,v).
+// corner of (u,v). Heights z count by their spread, because they may have another unit.
 class StraySearch {
  public:
   // left_out: per point; the flags of strays are set.
   StraySearch(std::span<const Vec3> positions, std::vector<char>& left_out)
-      : positions_(positions), left_out_(left_out) {}
+      : positions_(positions), left_out_(left_out) {
+    // Spread of z relative to that of x and y. Lower values keep more points above the others.
+    constexpr double kShareOfPlaces = 0.3;
+    const double height = InnerRange(SortedAlong(2, 1)),
+                 place = std::max(InnerRange(SortedAlong(0, 1)), InnerRange(SortedAlong(1, 1)));
+    units_.z() = height > 0 && place > 0 ? kShareOfPlaces * place / height : 1;
+  }
 
   void Run() {
     for (int round = 0; round < 2 && HasFarPoints(); ++round) {  // one kind may hide the other
@@ -280,7 +288,8 @@ class StraySearch {
     }
     for (std::size_t k = 0; k < positions_.size(); ++k) {
       if (left_out_[k] == 0) {
-        beyond = beyond.cwiseMax(low - positions_[k]).cwiseMax(positions_[k] - high);
+        const Vec3 p = positions_[k].cwiseProduct(units_);
+        beyond = beyond.cwiseMax(low - p).cwiseMax(p - high);
       }
     }
     return beyond.maxCoeff() > kFar * (high - low).maxCoeff();
@@ -290,7 +299,7 @@ class StraySearch {
     Along along;
     for (std::size_t k = 0; k < positions_.size(); k += every) {
       if (left_out_[k] == 0) {
-        along.emplace_back(positions_[k][axis], k);
+        along.emplace_back(units_[axis] * positions_[k][axis], k);
       }
     }
     std::sort(along.begin(), along.end());
@@ -320,6 +329,7 @@ class StraySearch {
 
   std::span<const Vec3> positions_;
   std::vector<char>& left_out_;
+  Vec3 units_ = Vec3::Ones();  // factors of x, y and z
 };
 
 template <class Value>
@@ -458,6 +468,9 @@ PreparedPoints PlacePoints(PointTable& table, std::span<const std::uint32_t> giv
           step("parameters", [&] { return FindParameters(table, triangles, given, options); }),
       .shape = {}};
   placed.shape = ShapeOver(placed.parameters, table, options);
+  if (RelaxationRounds(options.fit) == 0 && placed.parameters.is_graph && IsAlone(options.fit)) {
+    placed.shape.reference = OffsetReference::kWorld;  // so that z can be scaled
+  }
   if (RelaxationRounds(options.fit) > 0) {
     placed.moves = step("relaxation", [&] {
       return MoveUv(table, triangles, options, placed.shape, context, placed.parameters.uv);
@@ -613,17 +626,9 @@ double RootMeanSquare(std::span<const double> distances) {
   return std::sqrt(sum / static_cast<double>(distances.size()));
 }
 
-// The fit's RMS is weighted. Reports show the unweighted RMS first.
-void SplitRms(std::span<const double> weights, PointFit& result) {
-  if (std::ranges::any_of(weights, [&](double weight) { return weight != weights[0]; })) {
-    result.weighted_rms_mm = result.fit.point_rms_mm;
-    result.fit.point_rms_mm = RootMeanSquare(result.fit.residual_mm);
-  }
-}
-
-// Returns how far the surface goes beyond the box, in diagonals of the box. It looks at a grid of
-// places; more of them would only refine a figure that is compared with 3.
-double ReachBeyond(const HSplineSurface& surface, const Box3& box) {
+// Returns how far the surface goes beyond the box, in units of `size`. It looks at a grid of places;
+// more of them would only refine a figure that is compared with 3.
+double ReachBeyond(const HSplineSurface& surface, const Box3& box, double size) {
   constexpr int kCells = 64;  // along u and v
   double farthest = 0;
   for (int i = 0; i <= kCells; ++i) {
@@ -632,34 +637,57 @@ double ReachBeyond(const HSplineSurface& surface, const Box3& box) {
       farthest = std::max(farthest, box.exteriorDistance(at));
     }
   }
-  return farthest / box.diagonal().norm();
+  return farthest / size;
 }
 
-// The RMS distance in diagonals of the box. Given (u,v) may be wrong for some points, which are
-// then outliers and do not count.
-double FindOff(const GivenPoints& given, const FitResult& fit) {
-  if (!given.has_uv) {
-    return fit.point_rms_mm / given.box.diagonal().norm();
-  }
-  if (given.on_line) {
-    return kNaN;
-  }
-  std::vector<double> distances;
+// The distances of the points that are no outliers, with their indices.
+struct CountedDistances {
+  std::vector<double> distances_mm;
+  std::vector<std::uint32_t> points;
+};
+CountedDistances FindCounted(const FitResult& fit) {
+  CountedDistances counted;
   for (std::uint32_t k = 0; k < fit.residual_mm.size(); ++k) {
     if (!fit.automatic || !std::ranges::binary_search(fit.automatic->outliers, k)) {
-      distances.push_back(fit.residual_mm[k]);
+      counted.distances_mm.push_back(fit.residual_mm[k]);
+      counted.points.push_back(k);
     }
   }
-  return RootMeanSquare(distances) / given.box.diagonal().norm();
+  return counted;
 }
 
-void CompareWithPoints(const GivenPoints& given, PointFit& result) {
+// Compares shapes, in the coordinates of the fit.
+void CompareShapes(const GivenPoints& given, bool has_heights, PointFit& result) {
+  const double diagonal = given.box.diagonal().norm(), height = given.box.sizes().z();
+  result.reach = ReachBeyond(result.fit.surface, given.box,
+                             has_heights && height > 0 ? height : diagonal);
+  result.off = given.has_uv && given.on_line
+                   ? kNaN
+                   : RootMeanSquare(FindCounted(result.fit).distances_mm) / diagonal;
+}
+
+double WeightedRms(const CountedDistances& counted, std::span<const double> weights) {
+  double sum = 0, all = 0;
+  for (std::size_t n = 0; n < counted.points.size(); ++n) {
+    const double weight = weights[counted.points[n]];
+    sum += weight * counted.distances_mm[n] * counted.distances_mm[n];
+    all += weight;
+  }
+  return std::sqrt(sum / all);
+}
+
+// Compares distances, in the unit of the points.
+void CompareDistances(const GivenPoints& given, PointFit& result) {
   const std::optional<AutoReport>& report = result.fit.automatic;
-  result.sigma_factor = given.has_sigma && report ? SigmaFactor(*report, given.weights) : kNaN;
-  result.reach = ReachBeyond(result.fit.surface, given.box);
-  result.off = FindOff(given, result.fit);
+  const CountedDistances counted = FindCounted(result.fit);
+  const std::span<const double> weights = given.weights;
+  result.sigma_factor = given.has_sigma && report ? SigmaFactor(*report, weights) : kNaN;
   result.distance = ComputeQuantiles(result.fit);
-  SplitRms(given.weights, result);
+  if (std::ranges::any_of(weights, [&](double weight) { return weight != weights[0]; })) {
+    result.weighted_rms_mm = WeightedRms(counted, weights);
+  }
+  result.fit.point_rms_mm = RootMeanSquare(counted.distances_mm);
+  result.rms_of_all_mm = RootMeanSquare(result.fit.residual_mm);
 }
 
 // Converts the weights of smoothness to those of the terms as written, with which another plan
@@ -701,6 +729,7 @@ void RestoreOrder(const PointsOut& out, PointFit& result) {
   SpreadBack(out, Vec2(Vec2::Constant(kNaN)), result.fit.uv);
   SpreadBack(out, kNaN, result.fit.residual_mm);
   SpreadBack(out, kNaN, result.sigma_mm);
+  SpreadBack(out, kNaN, result.weights);
   for (std::vector<double>& values : result.attribute_at) {
     SpreadBack(out, kNaN, values);
   }
@@ -717,26 +746,22 @@ void RestoreOrder(const PointsOut& out, PointFit& result) {
 
 // States that a part of the points lies much farther from the surface than most; empty if none
 // does, or if those are outliers.
-std::string TailText(const FitResult& fit) {
+std::string TailText(const FitResult& fit, std::string_view unit) {
   constexpr double kLongTail = 3;  // RMS over median; 1.5 for normal errors, 2 for Laplace's
-  std::vector<double> distances;
-  for (std::uint32_t k = 0; fit.automatic && k < fit.residual_mm.size(); ++k) {
-    if (!std::ranges::binary_search(fit.automatic->outliers, k)) {
-      distances.push_back(fit.residual_mm[k]);
-    }
+  if (!fit.automatic || fit.automatic->met_to_rounding) {
+    return "";
   }
-  if (distances.empty() || fit.automatic->met_to_rounding) {
+  std::vector<double> distances = FindCounted(fit).distances_mm;
+  if (distances.empty()) {
     return "";
   }
   const double rms_mm = RootMeanSquare(distances), median_mm = UpperMedian(distances);
   return rms_mm > kLongTail * median_mm
              ? fmt::format(
-                   "the distances have a long tail: half of the points lie within {:.3g} mm, and "
-                   "the "
-                   "RMS is {:.3g} mm; many points may be gross errors that were not recognised, "
-                   "and "
-                   "the surface follows them; clean the points, and fit again",
-                   median_mm, rms_mm)
+                   "the distances have a long tail: half of the points lie within {}, and the RMS "
+                   "is {}; many points may be gross errors that were not recognised, and the "
+                   "surface follows them; clean the points, and fit again",
+                   LengthText(median_mm, unit, 3), LengthText(rms_mm, unit, 3))
              : "";
 }
 
@@ -781,7 +806,8 @@ std::vector<std::string> FindNotes(const PointTable& table, const PointsOut& out
   if (!out.strays.empty()) {
     notes.push_back(LeftOutText(out));
   }
-  if (const HSplineShape asked = ShapeFor(options); placed.shape != asked) {
+  if (const HSplineShape asked = ShapeFor(options);
+      placed.shape.patches_u != asked.patches_u || placed.shape.patches_v != asked.patches_v) {
     notes.push_back(fmt::format(
         "level 0 has {} x {} patches in place of {} x {}, by the shape of "
         "the domain; patches_by_shape: false keeps them",
@@ -795,11 +821,14 @@ std::vector<std::string> FindNotes(const PointTable& table, const PointsOut& out
   return notes;
 }
 
-PointFit BeginResult(PreparedPoints placed, FitResult fit, std::vector<PointAttribute> attributes) {
+PointFit BeginResult(PreparedPoints placed, FitResult fit, std::vector<PointAttribute> attributes,
+                     const std::string& unit) {
   const Parametrisation& parameters = placed.parameters;
   return {.parameters = std::string(
               EnumNames(parameters.source)[static_cast<std::size_t>(parameters.source)]),
           .how = parameters.how,
+          .unit = unit,
+          .is_graph = parameters.is_graph && !placed.moves,
           .map_faults = parameters.faults,
           .moves = placed.moves,
           .fit = std::move(fit),
@@ -827,12 +856,11 @@ std::vector<std::string> PointFit::Faults() const {
                     reach));
   }
   if (faults.empty() && off > kMostOff) {
-    const bool weighted = std::isfinite(weighted_rms_mm);
     faults.push_back(fmt::format(
-        "the points lie {:.3g} mm (RMS{}) from the surface, {:.3g} % of their extent, "
+        "the points lie {} (RMS) from the surface, {:.3g} % of their extent, "
         "as points that fill space or lie on several sheets do; give (u,v), other "
         "parameters, one sheet alone, or finer levels if it is one",
-        weighted ? weighted_rms_mm : fit.point_rms_mm, weighted ? ", weighted" : "", 100 * off));
+        LengthText(fit.point_rms_mm, unit, 3), 100 * off));
   }
   return faults;
 }
@@ -856,9 +884,13 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   StepClock step(context);
   PreparedPoints placed = PlacePoints(table, out.given, options, step, context);
   std::vector<std::string> notes = FindNotes(table, out, placed, options);
+  const bool has_heights = placed.shape.reference == OffsetReference::kWorld;
+  const double factor =
+      has_heights && table.exact.empty() ? HeightFactor(table.positions) : 1;
+  ScaleHeights(factor, table.positions);
   std::vector<Vec2>& uv = placed.parameters.uv;
   const HSplineSurface start = StartSurface(placed.shape, table.positions, uv);
-  CheckChord(options.chord_mm, start, {table.positions, uv}, context);
+  CheckChord(InUnitsOfFit(options.chord_mm, factor), start, {table.positions, uv}, context);
   std::vector<ExactPoint> exact = ExactPoints(table, uv);
   const GivenPoints given = KeepFacts(table, placed.parameters.source, exact);
   OwnedPoints points{std::move(table.positions), std::move(uv), std::move(table.weights)};
@@ -866,14 +898,24 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
     return FitOwned(start, std::move(points), std::move(exact), WithoutRelaxation(options.fit),
                     context);
   });
-  PointFit result = BeginResult(std::move(placed), std::move(fit), std::move(attributes));
-  CompareWithPoints(given, result);
+  PointFit result =
+      BeginResult(std::move(placed), std::move(fit), std::move(attributes), options.unit);
+  CompareShapes(given, has_heights, result);
   AddAttributes(given.weights, context, step, result);
+  ScaleHeights(1 / factor, result.fit);
+  result.height_factor = factor;
+  CompareDistances(given, result);
+  if (std::isfinite(result.weighted_rms_mm)) {
+    result.weights = given.weights;
+  }
+  if (result.fit.automatic) {
+    result.energy_weight = result.fit.automatic->weight;
+  }
   if (options.sigma) {
     AddSigma(given, start, step, result);
   }
   ConvertWeights(options.fit.terms, result.fit);
-  if (std::string tail = TailText(result.fit); !tail.empty()) {
+  if (std::string tail = TailText(result.fit, options.unit); !tail.empty()) {
     notes.push_back(std::move(tail));
   }
   if (!result.attributes.empty()) {

@@ -43,6 +43,7 @@ struct PointFitOptions {
       .terms = {PointTerm{}, SmoothnessTerm{.weight = AutoOr<double>::Auto(), .length_mm = 1}},
       .solver = Solver::kFastest};
   AutoOr<double> chord_mm = AutoOr<double>::Auto(0.05);
+  std::string unit = "";
   ResidualFile residuals = ResidualFile::kAuto;
   bool sigma = false;
   bool report = true;
@@ -80,10 +81,15 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                   .unit = "mm",
                   .min = 1e-9,
                   .max = 1e3,
-                  .doc = "largest distance of the triangles of surface.ply from the surface; auto: "
-                         "1/5000 of the points' extent, or more if that would be millions of "
-                         "triangles"},
+                  .doc = "largest distance of the triangles of surface.ply from the surface, along z "
+                         "for heights over x and y; auto: 1/5000 of the points' extent, or more if "
+                         "that would be millions of triangles"},
         o.chord_mm);
+  visit(FieldInfo{.name = "unit",
+                  .doc = "unit of the heights (of all coordinates, where they share one), which is "
+                         "printed beside lengths, such as m; files of points do not state it, so "
+                         "without this option lengths have no unit, whatever the options' names"},
+        o.unit);
   visit(FieldInfo{.name = "residuals",
                   .doc = "file of the points' residuals: csv: residuals.csv; ply: residuals.ply, "
                          "binary, faster and smaller; none: no file; auto: csv for up to 100000 "
@@ -109,14 +115,22 @@ std::vector<OptionFault> FaultsBetween(const PointFitOptions& options);
 struct PointFit {
   std::string parameters;  // a name of ParameterSource
   std::string how;         // the plane, axis or map in words; empty for given (u,v)
+  std::string unit = {};   // of lengths, from the options; empty if it is not known
+  bool is_graph = false;   // heights z over x and y (Parametrisation)
+  // The fit was done with z times this factor, so that the unit of z has no effect (HeightFactor).
+  // All figures are in the unit of the points. 1 for surfaces that are no heights over x and y.
+  double height_factor = 1;
+  double energy_weight = kNaN;         // of the thin-plate energy, as in AutoReport before terms
+  std::vector<double> weights = {};    // of all given points, NaN where left out; none if equal
   MapFaults map_faults;    // of the map that was used
   std::optional<FootMoves> moves =
       {};  // moves of (u,v) before the fit, if relaxation was asked for
-  // point_rms_mm counts all points alike. The weights of smoothness are those that the written
-  // terms would need for the same surface.
+  // point_rms_mm counts all points alike, outliers apart. The weights of smoothness are those that
+  // the written terms would need for the same surface.
   FitResult fit;
   double weighted_rms_mm = kNaN;  // RMS with the points' weights; NaN if all weights are equal
-  DistanceQuantiles distance;     // of the points from the surface
+  double rms_of_all_mm = kNaN;    // RMS of all points alike, outliers included
+  DistanceQuantiles distance;     // of the points from the surface, outliers apart
   std::vector<PointAttribute> attributes;         // as given
   std::vector<std::vector<double>> attribute_at;  // fitted, at the points
   AttributeFit attribute_fit;
@@ -125,9 +139,11 @@ struct PointFit {
   // Noise of the points over the given sigma, outliers apart; NaN without given sigma, and for
   // other plans than auto.
   double sigma_factor = kNaN;
-  double reach = kNaN;  // how far the surface goes beyond the points' box, in diagonals of the box
-  double off = kNaN;    // RMS distance of the points in diagonals of the box, weighted; for given
-                        // (u,v) without outliers, and NaN if the points lie on a line
+  // How far the surface goes beyond the points' box, in diagonals of the box, or for heights over x
+  // and y in its heights.
+  double reach = kNaN;
+  double off = kNaN;  // RMS distance of the points in diagonals of the box, outliers apart; NaN for
+                      // given (u,v) if the points lie on a line
   std::vector<std::uint32_t> strays =
       {};                               // left out before the fit, ascending: far from all others
   std::size_t not_finite = 0;           // points without a place, left out before the fit
@@ -135,7 +151,7 @@ struct PointFit {
   std::vector<StepTime> times;
 
   // The reasons why the result cannot be used; empty if it can. Besides the faults of the fit
-  // itself there are two: the surface goes three diagonals beyond the points, where nothing holds
+  // itself there are two: the surface goes three diagonals (or heights) beyond the points, where nothing holds
   // it; or the points lie a tenth of the diagonal from it, as on no single sheet.
   std::vector<std::string> Faults() const;
 };

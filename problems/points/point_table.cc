@@ -97,21 +97,75 @@ void AddNote(std::string note, PointTable& table) {
   }
 }
 
-// Writes the names of the columns that have a meaning in small letters.
-std::string InSmallLetters(std::string_view first_line) {
-  std::string line(first_line);
-  for (std::size_t begin = 0, end = 0; begin < line.size(); begin = end + 1) {
-    end = std::min(line.find(',', begin), line.size());
-    const std::string small = LowerCase(line.substr(begin, end - begin));
+// The coordinate that a name of maps means; empty for other names.
+std::string_view MapCoordinate(std::string_view name) {
+  static constexpr std::array<std::pair<std::string_view, std::string_view>, 14> kMapNames = {
+      {{"lon", "x"},
+       {"long", "x"},
+       {"longitude", "x"},
+       {"easting", "x"},
+       {"east", "x"},
+       {"lat", "y"},
+       {"latitude", "y"},
+       {"northing", "y"},
+       {"north", "y"},
+       {"depth", "z"},
+       {"height", "z"},
+       {"elevation", "z"},
+       {"elev", "z"},
+       {"altitude", "z"}}};
+  const auto found =
+      std::ranges::find(kMapNames, name, &std::pair<std::string_view, std::string_view>::first);
+  return found == kMapNames.end() ? "" : found->second;
+}
+
+// The first line of a table, with the names that the reader knows.
+struct FirstLineNames {
+  std::string line;
+  bool has_map_names = false;
+};
+
+// Calls use(begin, end, name) for each column of the line, with its name in small letters and
+// without quotes, from the last column to the first.
+template <class Use>
+void ForEachName(std::string_view line, const Use& use) {
+  for (std::size_t end = line.size(), begin = 0;; end = begin - 1) {
+    const std::size_t comma = end == 0 ? line.npos : line.rfind(',', end - 1);
+    begin = comma == line.npos ? 0 : comma + 1;
+    const std::string small = LowerCase(std::string(line.substr(begin, end - begin)));
     const std::size_t first = small.find_first_not_of(" \t\r\"\xEF\xBB\xBF"),
                       last = small.find_last_not_of(" \t\r\"");
-    if (first != small.npos && first <= last &&
-        std::ranges::find(kNames, std::string_view(small).substr(first, last + 1 - first)) !=
-            kNames.end()) {
-      line.replace(begin, end - begin, small);
+    if (first != small.npos && first <= last) {
+      use(begin, end, small.substr(first, last + 1 - first));
+    }
+    if (begin == 0) {
+      return;
     }
   }
-  return line;
+}
+
+// Writes the names of the columns that have a meaning in small letters, and those of maps as x, y
+// and z.
+FirstLineNames WithKnownNames(std::string_view first_line,
+                              std::span<const std::string> attributes) {
+  FirstLineNames names{std::string(first_line)};
+  std::vector<std::string> taken(attributes.begin(), attributes.end());
+  ForEachName(first_line, [&](std::size_t, std::size_t, const std::string& name) {
+    taken.push_back(name);
+  });
+  ForEachName(first_line, [&](std::size_t begin, std::size_t end, const std::string& name) {
+    const std::string coordinate(MapCoordinate(name));
+    const auto is_taken = [&](std::string_view by) { return std::ranges::count(taken, by) > 0; };
+    const bool is_attribute = std::ranges::find(attributes, name) != attributes.end();
+    if (!coordinate.empty() && !is_attribute && !is_taken(coordinate)) {
+      taken.push_back(coordinate);
+      names.has_map_names = true;
+      names.line.replace(begin, end - begin, coordinate);
+    } else if (std::ranges::find(kNames, std::string_view(name)) != kNames.end()) {
+      names.line.replace(begin, end - begin, name);
+    }
+  });
+  return names;
 }
 
 // The columns of a table: their meanings, and the names of those without effect.
@@ -248,12 +302,13 @@ bool PointColumns::Has(PointColumn wanted) const {
 
 PointColumns ReadPointColumns(std::string_view first_line, std::string_view name,
                               std::span<const std::string> attributes, FurtherColumns further) {
-  const std::string line = InSmallLetters(first_line);
-  const CsvReader csv(line, name);
+  const FirstLineNames names = WithKnownNames(first_line, attributes);
+  const CsvReader csv(names.line, name);
   const TableColumns found = ColumnsIn(csv, attributes, further);
   PointColumns columns{.kinds = {},
                        .attributes = {attributes.begin(), attributes.end()},
-                       .note = FurtherNote(found.further)};
+                       .note = FurtherNote(found.further),
+                       .has_map_names = names.has_map_names};
   columns.kinds.assign(csv.Columns().size(), columns.Kinds());
   for (std::size_t k = 0; k < found.indices.size(); ++k) {
     if (found.indices[k]) {
@@ -285,6 +340,7 @@ PlainPoints::PlainPoints(PointColumns columns)
       has_exact_(columns_.Has(PointColumn::kExact)),
       values_(columns_.Kinds() + 1, 0.0) {
   table_.weights_of_sigma = has_sigma_;
+  table_.has_map_columns = columns_.has_map_names;
   AddNote(columns_.note, table_);
   for (const std::string& attribute : columns_.attributes) {
     table_.attributes.push_back({attribute, {}});
@@ -366,8 +422,26 @@ PointTable ParsePointTable(std::string_view text, std::string_view name,
   if (!rest.empty() && plain.Add(rest.substr(1)) && plain.size() > 0) {
     return plain.Take();
   }
-  const std::string small = InSmallLetters(first_line).append(rest);
-  return PointReader(small, name, attributes, further).Read();
+  FirstLineNames names = WithKnownNames(first_line, attributes);
+  PointTable table =
+      PointReader(names.line.append(rest), name, attributes, further).Read();
+  table.has_map_columns = names.has_map_names;
+  return table;
+}
+
+std::vector<Vec2> ParsePlaces(std::string_view text, std::string_view name) {
+  const std::size_t end = std::min(text.find('\n'), text.size());
+  FirstLineNames names = WithKnownNames(text.substr(0, end), {});
+  CsvReader csv(names.line.append(text.substr(end)), name);
+  const std::size_t x = csv.RequireColumn("x"), y = csv.RequireColumn("y");
+  std::vector<Vec2> places;
+  while (csv.NextRow()) {
+    places.emplace_back(csv.Number(x), csv.Number(y));
+  }
+  if (places.empty()) {
+    csv.Fail("no place follows the names of the columns; give at least one line of numbers");
+  }
+  return places;
 }
 
 }  // namespace semblance::problems

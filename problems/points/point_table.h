@@ -26,6 +26,7 @@ struct PointTable {
   std::vector<Vec2> uv;                    // one per point, or none
   std::vector<double> weights;             // > 0; one per point, or none
   bool weights_of_sigma = false;           // the weights are 1 / sigma^2
+  bool has_map_columns = false;            // x, y or z has a name of maps, such as lon or depth
   std::vector<PointAttribute> attributes;  // the requested ones, in the requested order
   std::vector<std::uint32_t> exact;        // ascending indices of points to be met exactly
   std::vector<Vec3> exact_normals;         // one per exact point; zero leaves the normal free
@@ -49,7 +50,9 @@ void AddExact(PointTable& table, std::size_t point, const Vec3& normal);
 // together:
 //   the normal of the surface at an exact point, of any length, or 0, 0, 0;
 // - the attributes.
-// The names may be in capitals. Colours, an intensity and other numbers that scanners write (such
+// The names may be in capitals. Names of maps also mean x (lon, longitude, long, easting, east), y
+// (lat, latitude, northing, north) and z (depth, height, elevation, elev, altitude), unless there is
+// a column x, y or z or an attribute of that name. Colours, an intensity and other numbers that scanners write (such
 // as r, g, b, intensity) have no effect, which a note states; with FurtherColumns::kAny this holds
 // for every further column. Each further line has one decimal number per column. Throws IoError
 // (`name:line: what`) for any other column, a repeated column, an attribute without a column, a
@@ -61,6 +64,10 @@ PointTable ParsePointTable(std::string_view text, std::string_view name,
                            std::span<const std::string> attributes = {},
                            FurtherColumns further = FurtherColumns::kOfScanners);
 
+// Reads the places x and y of a table whose first line names the columns, also by names of maps.
+// Other columns have no effect. Throws IoError as ParsePointTable does.
+std::vector<Vec2> ParsePlaces(std::string_view text, std::string_view name);
+
 enum class PointColumn { kX, kY, kZ, kU, kV, kWeight, kSigma, kExact, kNx, kNy, kNz };
 constexpr std::size_t kPointColumns = 11;
 
@@ -70,6 +77,7 @@ struct PointColumns {
   std::vector<std::size_t> kinds;
   std::vector<std::string> attributes;
   std::string note = {};  // names the columns without effect; empty if there are none
+  bool has_map_names = false;  // PointTable::has_map_columns
 
   std::size_t Kinds() const { return kPointColumns + attributes.size(); }
   bool Has(PointColumn wanted) const;

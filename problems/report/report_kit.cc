@@ -73,10 +73,11 @@ std::string LegendTicks(const ColourMap& map) {
 
 std::string LegendHtml(const Legend& legend) {
   return fmt::format(
-      "<div class=\"view3d-legend\"><div>{} (mm)</div><div class=\"view3d-bar\" "
+      "<div class=\"view3d-legend\"><div>{}{}</div><div class=\"view3d-bar\" "
       "style=\"background:linear-gradient(to right,{})\"></div><div "
       "class=\"view3d-ticks\">{}</div>{}</div>",
-      EscapeHtml(legend.title), fmt::join(ColourSteps(legend.map), ","), LegendTicks(legend.map),
+      EscapeHtml(legend.title),
+      legend.unit.empty() ? "" : fmt::format(" ({})", EscapeHtml(legend.unit)), fmt::join(ColourSteps(legend.map), ","), LegendTicks(legend.map),
       legend.shows_no_data ? fmt::format("<small><i style=\"background:{}\"></i>no data</small>",
                                          HexText(kNoDataColour))
                            : "");

@@ -1,14 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/stl.h>
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 #include <stop_token>
 #include <utility>
+#include <vector>
 
 #include "problems/app/python/bindings.h"
 #include "problems/app/python/values.h"
 #include "problems/config/config.h"
 #include "problems/points/point_fit.h"
+#include "problems/points/prediction.h"
 
 namespace semblance::problems {
 namespace {
@@ -46,6 +50,25 @@ PointFit FitArrays(const Doubles& points, const std::optional<Doubles>& uv,
   });
 }
 
+py::dict PredictHeights(const PointFit& fit, const Doubles& xy, double level, int threads) {
+  if (!std::isfinite(fit.energy_weight)) {
+    throw InputError("predict needs a fit by plan: auto with solver: fastest");
+  }
+  const std::vector<Vec2> places = Points2(xy, "xy");
+  const PredictedHeights heights =
+      HeightPredictor(fit.fit.surface, EvidenceOf(fit)).At(places, level, threads);
+  py::array_t<bool> supported(static_cast<py::ssize_t>(heights.supported.size()));
+  std::ranges::transform(heights.supported, supported.mutable_data(),
+                         [](char flag) { return flag != 0; });
+  py::dict result;
+  result["z"] = MakeArray(heights.z);
+  result["sd"] = MakeArray(heights.sd);
+  result["low"] = MakeArray(heights.low);
+  result["high"] = MakeArray(heights.high);
+  result["supported"] = std::move(supported);
+  return result;
+}
+
 std::string FitDocumentation() {
   return "Fits an H-spline to scattered points, refined where they need it.\n\npoints: n x 3, mm. "
          "uv: n "
@@ -68,6 +91,11 @@ void BindFit(py::module_& module) {
       .def_property_readonly("rms_mm", [](const PointFit& f) { return f.fit.point_rms_mm; })
       .def_property_readonly("parameters", [](const PointFit& f) { return f.parameters; })
       .def_property_readonly("usable", [](const PointFit& f) { return f.Faults().empty(); })
+      .def("predict", &PredictHeights, py::arg("xy"), py::arg("level") = 0.9,
+           py::arg("threads") = 1,
+           "Heights at n x 2 places, for a fit of heights over x and y: a dictionary of n numbers "
+           "each: z, sd (of the surface), low and high (interval for a new observation, which holds "
+           "the share `level`) and supported (False where the points do not support z).")
       .def_property_readonly("faults", &PointFit::Faults,
                              "reasons why the result cannot be used, or empty");
   module.def("fit", &FitArrays, py::arg("points"), py::arg("uv") = py::none(),

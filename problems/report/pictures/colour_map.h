@@ -40,7 +40,8 @@ std::vector<std::string> ColourSteps(const ColourMap& map);
 // The key to a picture whose colours stand for numbers. Reports draw it below the picture.
 struct Legend {
   ColourMap map;
-  std::string title;          // the quantity shown, without its unit (mm)
+  std::string title;          // the quantity shown, without its unit
+  std::string unit = "mm";    // empty if it is not known
   bool shows_no_data = true;  // adds a swatch for "no data"
 };
 

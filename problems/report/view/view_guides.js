@@ -54,7 +54,7 @@ const SemblanceGuides = (() => {
     const is_long = figures.some((figure) => figure.length > 5);  // five would not fit
     for (const figure of is_long ? [figures[0], figures[2], figures[4]] : figures) { ticks.append(element('span', {textContent: figure})); }
     const none = element('i', {style: `background:${map.no_data}`});
-    return element('div', {className: 'view3d-legend'}, element('div', {textContent: `${map.title} (mm)`}),
+    return element('div', {className: 'view3d-legend'}, element('div', {textContent: map.unit === '' ? map.title : `${map.title} (${map.unit ?? 'mm'})`}),
                    bar, ticks, element('small', {}, none, 'no data'));
   };
 

@@ -153,6 +153,7 @@ class SemblanceMeasure {
     this.stages = stages;
     this.draw = draw;
     this.box = box;
+    this.unit = ` ${stages[0]?.description?.unit ?? 'mm'}`.trimEnd();
     this.digits = Math.max(1, Math.ceil(3 - Math.log10(Math.max(1e-9, box.getSize(new THREE.Vector3()).length()))));
     this.tool = 'none';
     this.marks = [];
@@ -199,9 +200,9 @@ class SemblanceMeasure {
     const straight = start.hit.point.distanceTo(hit.point), same = start.hit.object === hit.object;
     const {length, way} = same ? SemblanceSurface.alongSurface(hit.object.geometry, start.hit, hit)
                                : {length: NaN, way: [start.hit.point, hit.point]};
-    const along = isFinite(length) ? `, along the surface ${length.toFixed(this.digits)} mm`
+    const along = isFinite(length) ? `, along the surface ${length.toFixed(this.digits)}${this.unit}`
                                    : same ? ', not joined along the surface' : '';
-    this.mark(stage, hit.point, `${straight.toFixed(this.digits)} mm${along}`, isFinite(length) ? way : [start.hit.point, hit.point]);
+    this.mark(stage, hit.point, `${straight.toFixed(this.digits)}${this.unit}${along}`, isFinite(length) ? way : [start.hit.point, hit.point]);
   }
 
   // The first point of a surface on the ray, from either side. Translucent surfaces are one-sided otherwise.

@@ -209,7 +209,7 @@ class SemblanceStage {
     const values = difference || hit.object.userData.values, map = found.layer.map;
     if (!values) { return found.layer.label; }
     const value = values[hit.face.a], scale = difference ? 0 : this.description.maps[map].scale;
-    if (scale && !isNaN(value)) { return `${found.layer.label}: ${+(scale * value).toPrecision(3)} mm`; }
+    if (scale && !isNaN(value)) { return `${found.layer.label}: ${+(scale * value).toPrecision(3)} ${this.description.unit ?? 'mm'}`.trimEnd(); }
     const sign = value > 0 && (difference || map === 'error') ? '+' : '';
     return `${found.layer.label}: ${isNaN(value) ? 'no value here' : `${sign}${value.toFixed(1)} mm`}`;
   }
