@@ -53,6 +53,7 @@
 #include <span>
 #include <utility>
 
+#include "fitting/nested/error_structure.h"
 #include "fitting/nested/neighbour_noise.h"
 #include "fitting/nested/outlier_search.h"
 #include "fitting/nested/unresolved_detail.h"
@@ -151,6 +152,7 @@ struct Snapshot {
   double known = kNaN;  // weight for the final fit; NaN: search again, as it is quick or sampled
   BendingMetric metric;
   double held_square = kNaN;
+  std::vector<float> squares;  // of held-out inliers among the sampled points; NaN for the others
   int round = -1;
 };
 
@@ -220,7 +222,8 @@ class NestedFitter {
         space_(start.shape()),
         cap_(FinestAllowed(plan, start.shape())),
         held_(ChooseHeldOut(points_)),
-        outlier_(points_.size(), 0) {
+        outlier_(points_.size(), 0),
+        least_noise_square_(RoundingNoise()) {
     finest_ = FinestByDensity(points_, 1, space_[0].layout, cap_);
   }
 
@@ -232,7 +235,7 @@ class NestedFitter {
       context_.Report("fit",
                       fmt::format("{} vertices to level {}", space_.Vertices(), space_.finest()));
       FitRound();
-      if (IsMet() || !Refine()) {
+      if (IsMet() || IsRoundedBelow() || !Refine()) {
         break;
       }
     }
@@ -333,8 +336,10 @@ class NestedFitter {
       search.ClimbFromRough(kCoarseFactor, weight_);
     }
     SearchMetric(search, scan);
-    const NestedWeight chosen = search.Finish();
-    between_ = search.Between();
+    const double between = search.Between();
+    is_rounded_below_ = search.Finish().NoiseSquare(static_cast<double>(count)) < least_noise_square_;
+    const NestedWeight chosen = search.SmoothTo(least_noise_square_);
+    between_ = is_rounded_below_ ? chosen.weight : between;
     least_gain_ = search.least_gain();
     if (std::isnan(chosen.weight)) {
       RefuseFit("no smoothness has a usable solve; give more points than a plane needs");
@@ -377,10 +382,12 @@ class NestedFitter {
   void Judge(const NestedWeight& chosen, int steps) {
     residuals_ = solve_.Residuals({.every = every_});
     std::vector<double> squares;
+    std::vector<float> of_sampled(residuals_.size(), std::nanf(""));
     double weights = 0;
     ForEachSampled([&](std::size_t n, std::uint32_t k) {
       if (held_[k] != 0 && outlier_[k] == 0) {
         squares.push_back(Scaled(residuals_[n], k).Square());
+        of_sampled[n] = static_cast<float>(squares.back());
         weights += points_.Scale(k) * points_.Scale(k);
       }
     });
@@ -400,16 +407,49 @@ class NestedFitter {
                               .held_out_rms_mm = std::sqrt(held),
                               .steps = steps,
                               .outliers = outliers_});
-    if (!best_ || held * kBetterRatio < best_->held_square) {
+    if (!best_ || held * kBetterRatio < best_->held_square || IsSurelyBetter(of_sampled)) {
       best_ = Snapshot{.space = space_,
                        .solution = solve_.Solution(),
                        .weight = weight_,
                        .known = IsQuick() || every_ > 1 ? kNaN : between_,
                        .metric = metric_,
                        .held_square = held,
+                       .squares = std::move(of_sampled),
                        .round = static_cast<int>(report_.rounds.size()) - 1};
     }
   }
+
+  // Returns whether the held-out points are met better than by the best round, beyond the standard
+  // error of the mean difference. With many points that is less than kBetterRatio: surfaces that
+  // differ by a hundredth of the noise can be told apart.
+  bool IsSurelyBetter(const std::vector<float>& squares) const {
+    constexpr double kErrors = 1;
+    if (squares.size() != best_->squares.size()) {
+      return false;  // another sample
+    }
+    double sum = 0, sum_squares = 0, count = 0;
+    for (std::size_t n = 0; n < squares.size(); ++n) {
+      if (const double gain = double{best_->squares[n]} - squares[n]; std::isfinite(gain)) {
+        sum += gain;
+        sum_squares += gain * gain;
+        count += 1;
+      }
+    }
+    return sum > kErrors * std::sqrt(sum_squares - sum * sum / std::max(count, 1.0));
+  }
+
+  // The least noise of heights that were rounded to a lattice, along one axis; 0 for others. A
+  // surface with less follows the steps of the rounding.
+  double RoundingNoise() const {
+    constexpr double kAlongZ = 0.999;
+    const bool is_rounded = points_.lattice_mm > 0 && points_.channels == 1 && !points_.weighted &&
+                            std::abs(points_.axes(2, 0)) > kAlongZ && !LieAlongLines(points_);
+    return is_rounded ? points_.lattice_mm * points_.lattice_mm / 12 : 0;
+  }
+
+  // Returns whether cross-validation would follow the rounding; finer vertices would only do so
+  // more.
+  bool IsRoundedBelow() const { return is_rounded_below_; }
 
   // Returns whether the held-out points are met to round-off: points without noise on a surface of
   // the space.
@@ -543,6 +583,10 @@ class NestedFitter {
     if (DropOutliers(std::sqrt(chosen.score))) {
       chosen = FitAll(best.known);
     }
+    if (const double weight = WeightByRuns(); weight > weight_) {
+      report_.by_runs = true;
+      chosen = FitAll(weight);
+    }
     const double mean_weight = points_.mean_weight;
     if (ReinstateSteps(std::sqrt(chosen.score))) {
       chosen.mean_square *= mean_weight / points_.mean_weight;  // now of the new mean weight
@@ -559,6 +603,102 @@ class NestedFitter {
     return result;
   }
 
+  // Returns the smoothness that predicts whole runs of the file best, if it is clearly smoother than
+  // that of the last solution. Runs that drift, as a scanner's lines, look like detail to random
+  // points held out. Detail varies along the runs; where the means of the runs explain little of the
+  // residuals, the weight stays.
+  double WeightByRuns() {
+    constexpr double kFactor = 8, kMaxRatio = 1e9;
+    runs_ = FindFileRuns(points_);
+    if (runs_.count == 0) {
+      return weight_;
+    }
+    const RunSplit split = SplitRuns();
+    solve_.Begin(space_, PointChoice{.left_out = split.not_fitted}, metric_);
+    std::vector<double> best = RunSquares(split, weight_);
+    double weight = weight_;
+    for (double next = kFactor * weight_; next < kMaxRatio * weight_; next *= kFactor) {
+      const std::vector<double> squares = RunSquares(split, next);
+      if (!IsClearlyLess(squares, best)) {
+        break;
+      }
+      best = squares;
+      weight = next;
+    }
+    return weight > weight_ && RunsShareErrors(split, weight) ? weight : weight_;
+  }
+
+  struct RunSplit {
+    std::vector<char> not_fitted, not_held;  // per point
+  };
+  // Holds out one run in five.
+  RunSplit SplitRuns() const {
+    RunSplit split{.not_fitted = outlier_, .not_held = outlier_};
+    for (std::uint32_t k = 0; k < points_.size(); ++k) {
+      const std::uint64_t bits = (std::uint64_t{runs_.run[k]} + 1) * 0xD1B54A32D192ED03u;
+      const bool is_held = runs_.run[k] != FileRuns::kNone && (bits ^ bits >> 31) % 5 == 0;
+      split.not_fitted[k] |= is_held ? 1 : 0;
+      split.not_held[k] |= is_held ? 0 : 1;
+    }
+    return split;
+  }
+
+  // The mean squares of the held-out runs at a weight; NaN for the others.
+  std::vector<double> RunSquares(const RunSplit& split, double weight) {
+    std::vector<double> squares(runs_.count, 0), counts(runs_.count, 0);
+    ForEachHeld(split, weight, [&](std::uint32_t run, const Residual& residual) {
+      squares[run] += residual.Square();
+      counts[run] += 1;
+    });
+    for (std::size_t run = 0; run < squares.size(); ++run) {
+      squares[run] = counts[run] > 0 ? squares[run] / counts[run] : kNaN;
+    }
+    return squares;
+  }
+
+  template <class Visit>
+  void ForEachHeld(const RunSplit& split, double weight, const Visit& visit) {
+    solve_.SetWeight(weight);
+    solve_.Solve(least_gain_);
+    const std::vector<Residual> residuals = solve_.Residuals({.left_out = split.not_held});
+    std::size_t n = 0;
+    for (std::uint32_t k = 0; k < points_.size(); ++k) {
+      if (split.not_held[k] == 0) {
+        visit(runs_.run[k], Scaled(residuals[n++], k));
+      }
+    }
+  }
+
+  static bool IsClearlyLess(const std::vector<double>& next, const std::vector<double>& best) {
+    constexpr double kErrors = 2;
+    double sum = 0, squares = 0, count = 0;
+    for (std::size_t n = 0; n < next.size(); ++n) {
+      if (const double gain = best[n] - next[n]; std::isfinite(gain)) {
+        sum += gain;
+        squares += gain * gain;
+        count += 1;
+      }
+    }
+    return sum > kErrors * std::sqrt(std::max(squares - sum * sum / std::max(count, 1.0), 0.0));
+  }
+
+  // Returns whether the means of the held-out runs explain much of their residuals.
+  bool RunsShareErrors(const RunSplit& split, double weight) {
+    constexpr double kShare = 0.3;  // detail with some waves along a run has next to none
+    std::vector<Vec3> sums(runs_.count, Vec3::Zero());
+    std::vector<double> counts(runs_.count, 0);
+    double squares = 0, of_means = 0;
+    ForEachHeld(split, weight, [&](std::uint32_t run, const Residual& residual) {
+      sums[run] += Vec3(residual.along[0], residual.along[1], residual.along[2]);
+      counts[run] += 1;
+      squares += residual.Square();
+    });
+    for (std::size_t run = 0; run < sums.size(); ++run) {
+      of_means += counts[run] > 0 ? sums[run].squaredNorm() / counts[run] : 0;
+    }
+    return of_means > kShare * squares;
+  }
+
   // Computes the distances and their statistics, in the order of the curve (invariant 8).
   void Measure(NestedFitResult& result) {
     constexpr std::size_t kAtOnce = 1 << 14;  // points; bounds the memory
@@ -566,6 +706,7 @@ class NestedFitter {
     result.residual_mm.resize(points_.GivenSize());
     NestedResiduals residuals(solve_);
     PairCorrelation neighbours;
+    DesignEffect effect(runs_);
     std::optional<Residual> last;
     for (std::size_t begin = 0; begin < points_.size(); begin += kAtOnce) {
       const std::size_t end = std::min(begin + kAtOnce, points_.size());
@@ -581,9 +722,11 @@ class NestedFitter {
             neighbours.Add(*last, scaled);
           }
           last = scaled;
+          effect.Add(k, scaled);
         }
       }
     }
+    report_.effective_share = report_.met_to_rounding ? 1 : 1 / effect.Value();
     MeasureCopies(result);
     for (const RepeatedPoint& copy : points_.repeated) {
       sum += copy.weight * result.residual_mm[copy.given] * result.residual_mm[copy.given];
@@ -650,6 +793,7 @@ class NestedFitter {
     } else {
       chosen = search.FinalSolve(known);
     }
+    chosen = search.SmoothTo(least_noise_square_);
     weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
     return chosen;
   }
@@ -664,9 +808,9 @@ class NestedFitter {
     report_.limited_by_density =
         !report_.met_to_rounding && finest_ < cap_ && FinestOfMost() >= finest_;
     const Indices kept = SampledInliers();
-    const double left = 1 - chosen.degrees_of_freedom / static_cast<double>(kept.size());
-    constexpr double kMinLeft = 0.02;  // the trace of one probe is no more accurate than this
-    report_.noise_mm = std::sqrt(chosen.mean_square / std::max(left, kMinLeft));
+    report_.noise_mm = std::sqrt(chosen.NoiseSquare(static_cast<double>(kept.size())));
+    report_.lattice_mm = least_noise_square_ > 0 ? points_.lattice_mm : 0;
+    report_.outliers_together = StandTogether(outlier_);
     report_.neighbour_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kQuadraticOf20);
     report_.closer_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kPlaneOf8);
     for (std::uint32_t k = 0; k < points_.size(); ++k) {
@@ -715,6 +859,10 @@ class NestedFitter {
   double between_ = kNaN;  // NestedWeightSearch::Between
   BendingMetric metric_ = BendingMetric::Identity();
   int finest_scanned_ = -1;  // finest level at which stretched metrics were tried
+  // Errors that points share.
+  double least_noise_square_;      // RoundingNoise
+  bool is_rounded_below_ = false;  // of the last search
+  FileRuns runs_;                  // none before WeightByRuns
   // The progress.
   bool densified_ = false;        // Densify has overlaid a whole level
   std::optional<Snapshot> best_;  // invariant 5

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "fitting/nested/error_structure.h"
 #include "fitting/nested/neighbour_noise.h"
 #include "fitting/nested/outlier_search.h"
 #include "fitting/space/point_cloud.h"
@@ -318,6 +319,7 @@ NestedPoints TakeDisplacements(const HSplineSurface& start, OwnedPoints given, i
   points.patches = Vec2(shape.patches_u, shape.patches_v);
   points.periodic_u = shape.ClosedU();
   points.given = CurveOrder(shape, given.View());
+  points.lattice_mm = FindLatticeStep(given.positions);
   SubtractStart(start, given.uv, threads, given.positions);
   points.value = std::move(given.positions);
   points.uv = std::move(given.uv);

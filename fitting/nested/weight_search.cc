@@ -33,6 +33,11 @@ double WeightBetween(const NestedWeight& rougher, const NestedWeight& middle,
   return curvature > 0 && down < move && move < up ? middle.weight * std::exp(move) : middle.weight;
 }
 
+double NestedWeight::NoiseSquare(double count) const {
+  constexpr double kMinLeft = 0.02;  // the trace of one probe is no more accurate than this
+  return mean_square / std::max(1 - degrees_of_freedom / count, kMinLeft);
+}
+
 // If two scores are equal, the larger weight is better, so that round-off does not decide.
 bool NestedWeightSearch::IsBetter(const NestedWeight& next) const {
   constexpr double kEqual = 1e-5;  // relative; far above round-off, far below any real difference
@@ -181,6 +186,22 @@ NestedWeight NestedWeightSearch::FinalSolve(double weight) {
   best_ = {};
   tried_.clear();
   Try(weight);
+  return Finish();
+}
+
+// Makes a weight the best, whatever its score.
+void NestedWeightSearch::Take(double weight) {
+  best_ = {};
+  tried_.erase(weight);
+  Try(weight);
+}
+
+NestedWeight NestedWeightSearch::SmoothTo(double least_square) {
+  constexpr double kFactor = 2;
+  const double smoothest = kMaxWeightRatio * solve_.EvenWeight();
+  while (best_.NoiseSquare(count_) < least_square && best_.weight * kFactor < smoothest) {
+    Take(best_.weight * kFactor);
+  }
   return Finish();
 }
 

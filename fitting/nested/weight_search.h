@@ -15,6 +15,9 @@ struct NestedWeight {
   double score = kNaN;               // score of cross-validation, mm^2 along one axis
   double degrees_of_freedom = kNaN;  // trace of the influence matrix
   double mean_square = kNaN;         // mean squared residual along one axis, mm^2
+
+  // The noise of one of `count` points along one axis, mm^2.
+  double NoiseSquare(double count) const;
 };
 
 // The minimiser of the parabola through three scores, over the logarithms of weights and scores.
@@ -54,11 +57,14 @@ class NestedWeightSearch {
   double Between() const;
   // Solves with this weight, more accurately than for comparisons, and makes it the best.
   NestedWeight FinalSolve(double weight);
+  // Takes larger weights until the noise of a point along one axis is at least this, mm^2.
+  NestedWeight SmoothTo(double least_square);
   int steps() const { return steps_; }
   double least_gain() const { return least_gain_; }  // for the next search
 
  private:
   NestedWeight Try(double weight);
+  void Take(double weight);
   bool IsBetter(const NestedWeight& next) const;
   template <class Search>
   bool TryMetric(const BendingMetric& metric, const Search& search);

@@ -48,14 +48,29 @@ bool LeavesDetail(const AutoReport& r) {
          r.neighbour_noise_mm < kLeastNoiseShare * r.noise_mm;
 }
 
+// Returns whether points count clearly less than independent ones would.
+bool SharesErrors(const AutoReport& r) {
+  constexpr double kShare = 0.7;
+  return r.effective_share < kShare;
+}
+
 std::string Verdict(const AutoReport& r) {
   if (r.met_to_rounding) {
     return "points are met to a hundred-millionth of their extent: what is left is rounding";
   }
   if (r.limited_by_density) {
-    return "detail goes down to the points' spacing: denser points would show more";
+    return "detail, or errors that neighbours share, goes down to the points' spacing: denser points "
+           "would show which";
   }
-  return LeavesDetail(r) ? "residuals are still correlated: part of what counts as noise is detail"
+  if (r.outliers_together) {
+    return "outliers stand together, as on a feature that is narrower than the points' spacing: look "
+           "at them before you leave them out (fit.plan.outliers: keep)";
+  }
+  if (LeavesDetail(r)) {
+    return "residuals are still correlated: part of what counts as noise is detail";
+  }
+  return SharesErrors(r) ? "residuals are correlated, as errors that neighbours share: sd and "
+                           "intervals allow for it"
                          : "residuals look like noise: these points show no more detail";
 }
 
@@ -90,6 +105,9 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"direction_deg", r.direction_deg},
                {"neighbour_correlation", r.neighbour_correlation},
                {"effective_share", r.effective_share},
+               {"lattice_mm", r.lattice_mm},
+               {"smoothness_by_runs", r.by_runs},
+               {"outliers_together", r.outliers_together},
                {"met_to_rounding", r.met_to_rounding},
                {"limited_by_density", r.limited_by_density},
                {"verdict", Verdict(r)},
@@ -122,6 +140,17 @@ std::string AutoText(const AutoReport& r, std::string_view unit) {
         r.direction_deg, r.stretch);
   }
   text += CopiesText(r);
+  if (r.lattice_mm > 0) {
+    text += fmt::format("heights are whole multiples of {}: the surface does not follow the rounding\n",
+                        LengthText(r.lattice_mm, unit, 3));
+  }
+  if (r.by_runs) {
+    text += "runs of the file, such as scan lines, are off together: smoothness predicts whole runs\n";
+  }
+  if (SharesErrors(r)) {
+    text += fmt::format("points count as {:.2g} % as many independent ones\n",
+                        100 * r.effective_share);
+  }
   if (!r.outliers.empty()) {
     text += fmt::format("{} left out; residuals and result.json list {}\n",
                         Counted(std::ssize(r.outliers), "outlier"),

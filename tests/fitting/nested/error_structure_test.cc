@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Errors that points share: lattices, lines, runs of the file.
+#include "fitting/nested/error_structure.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "fitting/nested/nested_fit.h"
+#include "fitting/problem/start_surface.h"
+#include "surfaces/base/random.h"
+
+namespace semblance::fitting {
+namespace {
+
+constexpr HSplineShape kShape = {.patches_u = 8, .patches_v = 8, .max_level = 8};
+
+struct Points {
+  std::vector<Vec3> positions;
+  std::vector<Vec2> uv;
+
+  void Add(const Vec2& at, double z) {
+    positions.emplace_back(at.x(), at.y(), z);
+    uv.push_back(at);
+  }
+  NestedPoints Nested() const {
+    return DisplacementsFrom(StartSurface(kShape, positions, uv), {positions, uv}, 1);
+  }
+  NestedFitResult Fit() const {
+    return FitNested(StartSurface(kShape, positions, uv), {positions, uv},
+                     AutoPlan{.outliers = OutlierRule::kKeep}, {});
+  }
+};
+
+double Hills(const Vec2& at) {
+  return std::sin(5 * at.x() + 1) * std::cos(4 * at.y()) + 0.5 * std::sin(7 * at.y());
+}
+
+// The root mean square error of a surface of heights.
+double ErrorOf(const HSplineSurface& surface) {
+  double sum = 0;
+  constexpr int kAcross = 60;
+  for (int i = 0; i < kAcross; ++i) {
+    for (int j = 0; j < kAcross; ++j) {
+      const Vec2 at((i + 0.5) / kAcross, (j + 0.5) / kAcross);
+      const double off = surface.Point(at).z() - Hills(at);
+      sum += off * off;
+    }
+  }
+  return std::sqrt(sum) / kAcross;
+}
+
+TEST(ErrorStructure, AStepIsFoundOnlyWhereManyPointsShareTheirHeights) {
+  Random random(1);
+  std::vector<Vec3> whole, fine, free;
+  for (int k = 0; k < 3000; ++k) {
+    const double z = random.Uniform(0, 10);
+    whole.emplace_back(0, 0, 0.1 * std::round(z / 0.1) + 1e3);
+    fine.emplace_back(0, 0, 1e-4 * std::round(z / 1e-4));
+    free.emplace_back(0, 0, z);
+  }
+  EXPECT_NEAR(FindLatticeStep(whole), 0.1, 1e-9);
+  EXPECT_EQ(FindLatticeStep(fine), 0);
+  EXPECT_EQ(FindLatticeStep(free), 0);
+  EXPECT_EQ(FindLatticeStep(std::vector<Vec3>(100, Vec3(1, 2, 3))), 0);
+}
+
+// Whole numbers: the surface does not follow the steps, and the noise is that of the rounding.
+TEST(ErrorStructure, RoundedHeightsAreNotFollowed) {
+  Random random(2);
+  Points rounded;
+  constexpr double kStep = 0.125;
+  for (int k = 0; k < 20000; ++k) {
+    const Vec2 at(random.Uniform(0, 1), random.Uniform(0, 1));
+    rounded.Add(at, kStep * std::round(Hills(at) / kStep));
+  }
+  const NestedFitResult fit = rounded.Fit();
+  EXPECT_NEAR(fit.report.lattice_mm, kStep, 1e-9);
+  EXPECT_GT(fit.report.noise_mm, 0.95 * kStep / std::sqrt(12));
+  EXPECT_LT(ErrorOf(fit.surface), 0.25 * kStep / std::sqrt(12));
+}
+
+// Points of contours have few heights, which are exact.
+TEST(ErrorStructure, ContoursLieAlongLines) {
+  Random random(3);
+  Points contours, scattered;
+  for (int k = 0; k < 4000; ++k) {
+    const double angle = random.Uniform(0, 2 * std::numbers::pi), ring = 1 + k % 6;
+    const Vec2 at(0.5 + 0.08 * ring * std::cos(angle), 0.5 + 0.08 * ring * std::sin(angle));
+    contours.Add(at, ring);
+    scattered.Add({random.Uniform(0, 1), random.Uniform(0, 1)}, ring);
+  }
+  EXPECT_TRUE(LieAlongLines(contours.Nested()));
+  EXPECT_FALSE(LieAlongLines(scattered.Nested()));
+}
+
+// Scan lines in the order of the file, each `drift` off.
+Points ScanLines(double drift) {
+  Random random(4);
+  Points lines;
+  for (int line = 0; line < 80; ++line) {
+    const double off = drift * random.Normal();
+    for (int k = 0; k < 100; ++k) {
+      const Vec2 at((k + 0.5) / 100, (line + 0.5) / 80);
+      lines.Add(at, Hills(at) + off + 0.005 * random.Normal());
+    }
+  }
+  return lines;
+}
+
+TEST(ErrorStructure, RunsAreThoseOfTheFile) {
+  Points lines = ScanLines(0);
+  const NestedPoints nested = lines.Nested();
+  const FileRuns runs = FindFileRuns(nested);
+  ASSERT_EQ(runs.count, 80u);
+  for (std::size_t k = 0; k < nested.size(); ++k) {
+    EXPECT_EQ(runs.run[k], nested.given[k] / 100);
+  }
+  Random random(5);
+  Points shuffled;
+  for (int k = 0; k < 5000; ++k) {
+    shuffled.Add({random.Uniform(0, 1), random.Uniform(0, 1)}, 0.1 * random.Normal());
+  }
+  EXPECT_EQ(FindFileRuns(shuffled.Nested()).count, 0u);
+}
+
+// Lines that drift are noise and no detail; lines without drift are fitted as before.
+TEST(ErrorStructure, LinesThatDriftAreNotFollowed) {
+  const NestedFitResult drifting = ScanLines(0.05).Fit(), steady = ScanLines(0).Fit();
+  EXPECT_TRUE(drifting.report.by_runs);
+  EXPECT_LT(ErrorOf(drifting.surface), 0.03);
+  EXPECT_LT(drifting.report.effective_share, 0.1);
+  EXPECT_FALSE(steady.report.by_runs);
+  EXPECT_LT(ErrorOf(steady.surface), 0.002);
+  EXPECT_GT(steady.report.effective_share, 0.7);
+}
+
+// The design effect of blocks that share a part of their error, by its definition.
+TEST(ErrorStructure, TheDesignEffectCountsSharedErrors) {
+  Random random(6);
+  const FileRuns none;
+  DesignEffect independent(none), shared(none);
+  double of_block = 0;
+  for (std::size_t k = 0; k < 64 * 400; ++k) {
+    of_block = k % 64 == 0 ? random.Normal() : of_block;
+    independent.Add(k, {{random.Normal(), 0, 0}});
+    shared.Add(k, {{of_block + random.Normal(), 0, 0}});
+  }
+  EXPECT_NEAR(independent.Value(), 1, 0.3);
+  EXPECT_NEAR(shared.Value(), (64 + 1) / 2.0, 6);  // (m s^2 + n^2) / (s^2 + n^2) with m = 64
+}
+
+TEST(ErrorStructure, OutliersStandTogetherOnARidge) {
+  Random random(7);
+  std::vector<char> alone(20000, 0), ridge(20000, 0);
+  for (int k = 0; k < 400; ++k) {
+    alone[static_cast<std::size_t>(random.Uniform(0, 19999))] = 1;
+    ridge[static_cast<std::size_t>(2 * k + 5000)] = 1;
+  }
+  EXPECT_FALSE(StandTogether(alone));
+  EXPECT_TRUE(StandTogether(ridge));
+  EXPECT_FALSE(StandTogether(std::vector<char>(100, 0)));
+}
+
+}  // namespace
+}  // namespace semblance::fitting
