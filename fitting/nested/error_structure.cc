@@ -9,10 +9,11 @@
 namespace semblance::fitting {
 
 double FindLatticeStep(std::span<const Vec3> positions) {
-  constexpr std::size_t kSample = 4000;       // bounds the time of most files
-  constexpr double kWhole = 1e-3;             // of a step, beyond rounding
-  constexpr double kRoundOff = 1e-9;          // of the range
-  constexpr std::size_t kSharing = 2;         // points that share a value on average, at least
+  constexpr std::size_t kSample = 4000;     // bounds the time of most files
+  constexpr double kWhole = 1e-3;           // of a step, beyond rounding
+  constexpr double kRoundOff = 1e-9;        // of the range
+  constexpr std::size_t kFewestValues = 8;  // fewer are terraces rather than rounded heights
+  constexpr std::size_t kSharing = 2;       // points that share a value on average, at least
   std::vector<double> values;
   for (std::size_t k = 0; k < positions.size();
        k += std::max<std::size_t>(positions.size() / kSample, 1)) {
@@ -29,7 +30,7 @@ double FindLatticeStep(std::span<const Vec3> positions) {
       ++distinct;
     }
   }
-  if (!(step > 0) || distinct < 3 || kSharing * distinct > values.size()) {
+  if (!(step > 0) || distinct < kFewestValues || kSharing * distinct > values.size()) {
     return 0;
   }
   const auto is_whole = [&](const Vec3& p) {
@@ -148,8 +149,8 @@ double DesignEffect::Value() const {
   for (std::size_t b = 0; b < kBlocks.size() && square > 0; ++b) {
     const double independent =
         square * static_cast<double>(kBlocks[b]) * static_cast<double>(sums_[b].blocks);
-    largest = std::max(
-        largest, CertainEffect(sums_[b].squares_of_sums / independent, sums_[b].blocks));
+    largest =
+        std::max(largest, CertainEffect(sums_[b].squares_of_sums / independent, sums_[b].blocks));
   }
   double squares_of_sums = 0, in_runs = 0;
   for (const RunSum& run : of_runs_) {
@@ -179,8 +180,8 @@ bool StandTogether(const std::vector<char>& outlier) {
     }
     together += is_together ? 1 : 0;
   }
-  const double share = static_cast<double>(outliers) / static_cast<double>(std::max<std::ptrdiff_t>(
-                                                           count, 1)),
+  const double share = static_cast<double>(outliers) /
+                       static_cast<double>(std::max<std::ptrdiff_t>(count, 1)),
                by_chance = 1 - std::pow(1 - share, 2 * kAround);
   return outliers >= kFewest && together > (by_chance + kBeyondChance) * outliers;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Errors that points share: values that were rounded to a lattice, and runs of points in the order of
-// the file, as a scanner's lines, that drift together.
+// Errors that points share: values that were rounded to a lattice, and runs of points in the order
+// of the file, as a scanner's lines, that drift together.
 #pragma once
 
 #include <array>
@@ -61,8 +61,8 @@ class DesignEffect {
   std::size_t count_ = 0;
 };
 
-// Returns whether far more outliers have another one among the eight points next to them on the curve
-// than by chance, as on a ridge that is narrower than the points' spacing.
+// Returns whether far more outliers have another one among the eight points next to them on the
+// curve than by chance, as on a ridge that is narrower than the points' spacing.
 bool StandTogether(const std::vector<char>& outlier);
 
 }  // namespace semblance::fitting

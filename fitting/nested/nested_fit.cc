@@ -337,7 +337,8 @@ class NestedFitter {
     }
     SearchMetric(search, scan);
     const double between = search.Between();
-    is_rounded_below_ = search.Finish().NoiseSquare(static_cast<double>(count)) < least_noise_square_;
+    is_rounded_below_ =
+        search.Finish().NoiseSquare(static_cast<double>(count)) < least_noise_square_;
     const NestedWeight chosen = search.SmoothTo(least_noise_square_);
     between_ = is_rounded_below_ ? chosen.weight : between;
     least_gain_ = search.least_gain();
@@ -603,10 +604,10 @@ class NestedFitter {
     return result;
   }
 
-  // Returns the smoothness that predicts whole runs of the file best, if it is clearly smoother than
-  // that of the last solution. Runs that drift, as a scanner's lines, look like detail to random
-  // points held out. Detail varies along the runs; where the means of the runs explain little of the
-  // residuals, the weight stays.
+  // Returns the smoothness that predicts whole runs of the file best, if it is clearly smoother
+  // than that of the last solution. Runs that drift, as a scanner's lines, look like detail to
+  // random points held out. Detail varies along the runs; where the means of the runs explain
+  // little of the residuals, the weight stays.
   double WeightByRuns() {
     constexpr double kFactor = 8, kMaxRatio = 1e9;
     runs_ = FindFileRuns(points_);

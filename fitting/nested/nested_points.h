@@ -49,7 +49,8 @@ struct NestedPoints {
   std::vector<Vec3> value;              // displacement per channel, mm; 0 beyond the last channel
   std::vector<std::uint32_t> given;     // given index of each point
   std::vector<RepeatedPoint> repeated;  // copies, which are not in the arrays above
-  double lattice_mm = 0;  // all z are whole multiples of it apart (FindLatticeStep); 0: they are not
+  double lattice_mm =
+      0;  // all z are whole multiples of it apart (FindLatticeStep); 0: they are not
   int channels = 0;
   Eigen::Matrix<double, 3, Eigen::Dynamic> axes{3, 0};  // orthonormal, a column per channel
 

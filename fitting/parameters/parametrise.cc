@@ -163,9 +163,7 @@ Parametrisation ParametriseBy(Scan scan, const GivenParameters& given) {
   CheckSpread(scan.given_uv);
   CheckMeaning(scan, given.folds);
   const bool is_graph = scan.closure == Closure::kOpen && AreLinearInXy(scan);
-  return {.uv = std::move(scan.given_uv),
-          .source = ParameterSource::kGiven,
-          .is_graph = is_graph};
+  return {.uv = std::move(scan.given_uv), .source = ParameterSource::kGiven, .is_graph = is_graph};
 }
 
 // ----------------------------------------------------------- plane, cylinder, mesh
@@ -225,13 +223,12 @@ MapFaults FindFaults(const Scan& scan, const PointMap& map, double height_factor
           .mirrored = by_triangles.mirrored};
 }
 
-// The same. Heights that spread more than the plane are reduced to its spread: they may have another
-// unit.
+// The same. Heights that spread more than the plane are reduced to its spread: they may have
+// another unit.
 MapFaults FindFaults(const Scan& scan, const PointMap& map) {
   const PlaneSpreads spreads = MeasureSpreads(scan, map);
   return FindFaults(
-      scan, map,
-      spreads.height_mm > spreads.place_mm ? spreads.place_mm / spreads.height_mm : 1);
+      scan, map, spreads.height_mm > spreads.place_mm ? spreads.place_mm / spreads.height_mm : 1);
 }
 
 // The first map with next to no faults, or else the one with the fewest.
@@ -371,8 +368,8 @@ bool SpreadOverXy(std::span<const Vec3> positions) {
 // heights, and next to none of them fold. Heights count by their shape alone. Names of columns that
 // mean a map need less evidence.
 std::optional<CheckedMap> HeightsOverXy(const Scan& scan, const MapChoice& planes) {
-  // Trades noise as large as the relief (0.5), which passes, for shells and solids (0.8 to 1), which
-  // do not.
+  // Trades noise as large as the relief (0.5), which passes, for shells and solids (0.8 to 1),
+  // which do not.
   constexpr double kMostScatter = 0.7;
   // Spread of the heights relative to the places. Higher values find closer sheets, and more folds
   // in rough terrain where there are none.
@@ -387,10 +384,9 @@ std::optional<CheckedMap> HeightsOverXy(const Scan& scan, const MapChoice& plane
   const double factor =
       spreads.height_mm > 0 ? kHeightShare * spreads.place_mm / spreads.height_mm : 1;
   map.faults = FindFaults(scan, map.map, factor);
-  const bool is_found =
-      scan.has_map_columns
-          ? map.faults.Sum() <= kMostFaultsOfMap
-          : map.faults.Sum() <= kMostFaults && HeightScatter(scan, map.map) <= kMostScatter;
+  const bool is_found = scan.has_map_columns ? map.faults.Sum() <= kMostFaultsOfMap
+                                             : map.faults.Sum() <= kMostFaults &&
+                                                   HeightScatter(scan, map.map) <= kMostScatter;
   return is_found ? std::optional(std::move(map)) : std::nullopt;
 }
 

@@ -51,10 +51,10 @@ void Fields(Visitor& visit, GivenParameters& o) {
         o.folds);
 }
 
-// Orthogonal projection on a plane: along z, if the points are heights over x and y, and otherwise on
-// the plane of least squares, for height fields in any pose. On a given normal's plane u runs along
-// the coordinate axis that is nearest to the plane (the first of equals); on the plane of least
-// squares u runs along its longest direction.
+// Orthogonal projection on a plane: along z, if the points are heights over x and y, and otherwise
+// on the plane of least squares, for height fields in any pose. On a given normal's plane u runs
+// along the coordinate axis that is nearest to the plane (the first of equals); on the plane of
+// least squares u runs along its longest direction.
 struct PlaneParameters {
   static constexpr std::string_view kName = "plane";
   std::array<double, 3> normal = {0, 0, 0};

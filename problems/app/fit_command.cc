@@ -141,9 +141,8 @@ std::string CheckPrediction(const PredictArguments& a) {
 int Predict(const PredictArguments& a) {
   const std::string ending = CheckPrediction(a);
   FittedHeights fitted = ReadFittedHeights(a.surface);
-  const HeightPredictor predictor(std::move(fitted.surface), a.values_only
-                                                                 ? std::nullopt
-                                                                 : std::move(fitted.evidence));
+  const HeightPredictor predictor(std::move(fitted.surface),
+                                  a.values_only ? std::nullopt : std::move(fitted.evidence));
   const std::optional<PlaceGrid> grid =
       std::isnan(a.grid) ? std::nullopt : std::optional(MakePlaceGrid(predictor.map(), a.grid));
   const std::vector<Vec2> places = grid ? grid->Places() : ReadPlaces(a.places);

@@ -17,6 +17,7 @@
 #include "problems/points/height_field.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
+#include "surfaces/hspline/patch_tree.h"
 #include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -49,8 +50,10 @@ void RefuseBelow(double least_mm, double chord_mm) {
   }
 }
 
-// chord_mm, or as much more as keeps the number of cells, each of two triangles, at most_cells.
+// chord_mm, or as much more as keeps the number of cells, each of two triangles, at most_cells, or
+// at one for each patch of a surface that has more patches.
 double AffordableChord(const HSplineSurface& surface, double chord_mm, double most_cells) {
+  most_cells = std::max(most_cells, static_cast<double>(PatchTree(surface).leaves().size()));
   while (std::isfinite(chord_mm) && CellsToChord(surface, chord_mm) > most_cells) {
     chord_mm *= 2;
   }

@@ -41,8 +41,8 @@ struct ResidualColumns {
 };
 
 // Encodes one line per point, in the order of the table: its number, (u,v) and distance; 1 for an
-// outlier if the fit looks for outliers; the weight if weights differ; sigma_mm if it is known; and for each attribute the fitted
-// value, and the given value less the fitted one.
+// outlier if the fit looks for outliers; the weight if weights differ; sigma_mm if it is known; and
+// for each attribute the fitted value, and the given value less the fitted one.
 std::string ResidualsCsv(const ResidualColumns& columns);
 
 // Encodes the same as binary PLY: vertices at (u, v, 0) with the scalars residual_mm, outlier,

@@ -197,9 +197,9 @@ std::string ToleranceText(const ToleranceReport& r, std::string_view unit) {
                               : fmt::format(" (or that of {}, where one holds a point)",
                                             r.regions == 1 ? "the region" : "the regions");
   if (r.Met()) {
-    return fmt::format(
-        "the tolerance of {}{} is met: every one of {} points is within {}",
-        LengthText(r.tolerance_mm, unit), own, r.points, LengthText(r.largest_mm, unit));
+    return fmt::format("the tolerance of {}{} is met: every one of {} points is within {}",
+                       LengthText(r.tolerance_mm, unit), own, r.points,
+                       LengthText(r.largest_mm, unit));
   }
   std::string text = fmt::format(
       "THE TOLERANCE WAS MISSED: {} of {} points ({:.3g} %) are farther off than {}{}, "

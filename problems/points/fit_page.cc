@@ -62,13 +62,14 @@ std::vector<ReportTile> Tiles(const PointFit& result, const Tolerance& tolerance
       {"largest", TableFigures(result.distance.max_mm), result.unit, ""},
       {"control vertices", std::to_string(CountVertices(result.fit.surface)), "", ""}};
   if (std::isfinite(result.weighted_rms_mm)) {
-    tiles.insert(tiles.begin() + 2, {"weighted RMS", TableFigures(result.weighted_rms_mm), result.unit,
-                                     "points count by their weights, as in the fit"});
+    tiles.insert(tiles.begin() + 2, {"weighted RMS", TableFigures(result.weighted_rms_mm),
+                                     result.unit, "points count by their weights, as in the fit"});
   }
   if (tolerance) {
-    tiles.push_back({"tolerance", tolerance->Met() ? "met" : "missed", "",
-                     fmt::format("{}; {} beyond it", LengthText(tolerance->tolerance_mm, result.unit),
-                                 Counted(tolerance->beyond, "point"))});
+    tiles.push_back(
+        {"tolerance", tolerance->Met() ? "met" : "missed", "",
+         fmt::format("{}; {} beyond it", LengthText(tolerance->tolerance_mm, result.unit),
+                     Counted(tolerance->beyond, "point"))});
   }
   if (result.fit.automatic) {
     tiles.push_back(
@@ -117,7 +118,8 @@ ReportTable CellsTable(const std::vector<FitCell>& cells, const std::string& uni
   }
   ReportTable table{
       "Cells of the surface by level, without outliers; each cell is one polynomial patch",
-      {"level", "cells", "of the domain (%)", "points", Heading("RMS", unit), Heading("largest", unit)}};
+      {"level", "cells", "of the domain (%)", "points", Heading("RMS", unit),
+       Heading("largest", unit)}};
   for (const auto& [number, level] : levels) {
     table.AddRow(number, level.cells, TablePercent(level.area), level.points,
                  level.points > 0 ? TableFigures(std::sqrt(level.squares / level.points)) : "",
@@ -144,9 +146,10 @@ ReportTable WorstTable(std::vector<FitCell> cells, const std::string& unit) {
 }
 
 ReportTable RoundsTable(const FitResult& fit, std::string_view weighted, const std::string& unit) {
-  ReportTable table{fmt::format("Round by round{}", weighted),
-                    {"round", "finest level", Heading("RMS before", unit), Heading("RMS after", unit), "vertices free",
-                     "weight of smoothness", "steps of the solver", "solver"}};
+  ReportTable table{
+      fmt::format("Round by round{}", weighted),
+      {"round", "finest level", Heading("RMS before", unit), Heading("RMS after", unit),
+       "vertices free", "weight of smoothness", "steps of the solver", "solver"}};
   for (const LevelSummary& level : fit.levels) {
     table.AddRow(table.rows.size() + 1, level.level, TableFigures(level.rms_before_mm),
                  TableFigures(level.rms_after_mm),
@@ -212,12 +215,12 @@ std::string FitPageHtml(const PointFitOptions& options, const PointSource& sourc
   report.faults = result.Faults();
   report.notes = Notes(result, tolerance);
   report.scenes = FitScene(grid, result.unit);
-  report.scenes_note =
-      exaggeration == 1
-          ? "Simplified for display; surface.hspline.json is exact."
-          : fmt::format("Simplified for display, with z multiplied by {:.3g}; "
-                        "surface.hspline.json is exact.",
-                        exaggeration);
+  report.scenes_note = exaggeration == 1
+                           ? "Simplified for display; surface.hspline.json is exact."
+                           : fmt::format(
+                                 "Simplified for display, with z multiplied by {:.3g}; "
+                                 "surface.hspline.json is exact.",
+                                 exaggeration);
   report.main_images = {
       {SurfacePng(grid, threads),
        "Left: the surface. Right: the surface, coloured by the distance of the points.",

@@ -197,7 +197,7 @@ std::string FitScene(const FitGrid& grid, const std::string& unit) {
       {"maps",
        {{"distance",
          {{"title", "distance of the points"},
-           {"unit", unit},
+          {"unit", unit},
           {"low_mm", 0},
           {"high_mm", 100},
           {"scale", scale},

@@ -59,11 +59,13 @@ std::string Verdict(const AutoReport& r) {
     return "points are met to a hundred-millionth of their extent: what is left is rounding";
   }
   if (r.limited_by_density) {
-    return "detail, or errors that neighbours share, goes down to the points' spacing: denser points "
+    return "detail, or errors that neighbours share, goes down to the points' spacing: denser "
+           "points "
            "would show which";
   }
   if (r.outliers_together) {
-    return "outliers stand together, as on a feature that is narrower than the points' spacing: look "
+    return "outliers stand together, as on a feature that is narrower than the points' spacing: "
+           "look "
            "at them before you leave them out (fit.plan.outliers: keep)";
   }
   if (LeavesDetail(r)) {
@@ -141,15 +143,17 @@ std::string AutoText(const AutoReport& r, std::string_view unit) {
   }
   text += CopiesText(r);
   if (r.lattice_mm > 0) {
-    text += fmt::format("heights are whole multiples of {}: the surface does not follow the rounding\n",
-                        LengthText(r.lattice_mm, unit, 3));
+    text +=
+        fmt::format("heights are whole multiples of {}: the surface does not follow the rounding\n",
+                    LengthText(r.lattice_mm, unit, 3));
   }
   if (r.by_runs) {
-    text += "runs of the file, such as scan lines, are off together: smoothness predicts whole runs\n";
+    text +=
+        "runs of the file, such as scan lines, are off together: smoothness predicts whole runs\n";
   }
   if (SharesErrors(r)) {
-    text += fmt::format("points count as {:.2g} % as many independent ones\n",
-                        100 * r.effective_share);
+    text +=
+        fmt::format("points count as {:.2g} % as many independent ones\n", 100 * r.effective_share);
   }
   if (!r.outliers.empty()) {
     text += fmt::format("{} left out; residuals and result.json list {}\n",
@@ -294,8 +298,8 @@ Json FitResultJson(const PointFitOptions& options, const PointSource& source,
 
 void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& folder) {
   constexpr std::size_t kMostAsText = 100'000;  // documented with the option `residuals`
-  const ResidualColumns columns{result.fit, result.attributes, result.attribute_at,
-                                result.sigma_mm, result.weights};
+  const ResidualColumns columns{result.fit, result.attributes, result.attribute_at, result.sigma_mm,
+                                result.weights};
   if (kind == ResidualFile::kAuto) {
     kind = result.fit.residual_mm.size() <= kMostAsText ? ResidualFile::kCsv : ResidualFile::kPly;
   }
@@ -319,10 +323,10 @@ std::vector<std::string> TerminalNotes(const PointFitOptions& options, const Poi
                                        double chord_mm) {
   std::vector<std::string> notes = result.notes;
   if (std::isfinite(result.weighted_rms_mm)) {
-    notes.push_back(
-        fmt::format("weighted RMS {}: points count by their weights, as in the fit; in the RMS they "
-                    "all count alike",
-                    LengthText(result.weighted_rms_mm, result.unit)));
+    notes.push_back(fmt::format(
+        "weighted RMS {}: points count by their weights, as in the fit; in the RMS they "
+        "all count alike",
+        LengthText(result.weighted_rms_mm, result.unit)));
   }
   if (!result.how.empty()) {
     notes.push_back(fmt::format("(u,v) by {}", result.how));

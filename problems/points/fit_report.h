@@ -18,8 +18,8 @@ namespace semblance::problems {
 
 nlohmann::ordered_json AutoJson(const AutoReport& report);
 
-// Returns a few lines about noise, outliers, and whether denser points would show more detail. unit:
-// of lengths, or empty.
+// Returns a few lines about noise, outliers, and whether denser points would show more detail.
+// unit: of lengths, or empty.
 std::string AutoText(const AutoReport& report, std::string_view unit = "");
 
 // Returns a sentence about the moves of (u,v) before the fit.

@@ -52,7 +52,8 @@ HSplineSurface WithScaledHeights(const HSplineSurface& surface, double factor) {
   for (int level = 1; level <= surface.shape().max_level; ++level) {
     std::map<VertexId, std::optional<Vec3>> offsets;
     for (const auto& [vertex, offset] : surface.Offsets(level)) {
-      offsets.emplace_hint(offsets.end(), vertex, Vec3(offset.x(), offset.y(), factor * offset.z()));
+      offsets.emplace_hint(offsets.end(), vertex,
+                           Vec3(offset.x(), offset.y(), factor * offset.z()));
     }
     scaled.SetOffsets(offsets);
   }
@@ -85,8 +86,8 @@ void ScaleHeights(double factor, FitResult& fit) {
 }
 
 std::optional<GraphMap> GraphMap::Of(const HSplineSurface& surface) {
-  constexpr int kPlaces = 4;        // along u and v
-  constexpr double kExact = 1e-7;   // of the lengths; files keep at least as many digits
+  constexpr int kPlaces = 4;       // along u and v
+  constexpr double kExact = 1e-7;  // of the lengths; files keep at least as many digits
   if (surface.shape().ClosedU()) {
     return std::nullopt;
   }

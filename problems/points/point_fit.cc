@@ -260,8 +260,10 @@ class StraySearch {
       : positions_(positions), left_out_(left_out) {
     // Spread of z relative to that of x and y. Lower values keep more points above the others.
     constexpr double kShareOfPlaces = 0.3;
-    const double height = InnerRange(SortedAlong(2, 1)),
-                 place = std::max(InnerRange(SortedAlong(0, 1)), InnerRange(SortedAlong(1, 1)));
+    const std::size_t every = std::max<std::size_t>(positions_.size() / kSample, 1);
+    const double height = InnerRange(SortedAlong(2, every)),
+                 place =
+                     std::max(InnerRange(SortedAlong(0, every)), InnerRange(SortedAlong(1, every)));
     units_.z() = height > 0 && place > 0 ? kShareOfPlaces * place / height : 1;
   }
 
@@ -275,7 +277,6 @@ class StraySearch {
  private:
   // Returns whether some point is so far from the quartiles of a sample that a search may find it.
   bool HasFarPoints() const {
-    constexpr std::size_t kSample = 10000;
     constexpr double kFar = 2.5;  // distances between quartiles, the widest
     Vec3 low = Vec3::Zero(), high = Vec3::Zero(), beyond = Vec3::Zero();
     for (int axis = 0; axis < 3; ++axis) {
@@ -327,6 +328,7 @@ class StraySearch {
     }
   }
 
+  static constexpr std::size_t kSample = 10000;
   std::span<const Vec3> positions_;
   std::vector<char>& left_out_;
   Vec3 units_ = Vec3::Ones();  // factors of x, y and z
@@ -626,8 +628,8 @@ double RootMeanSquare(std::span<const double> distances) {
   return std::sqrt(sum / static_cast<double>(distances.size()));
 }
 
-// Returns how far the surface goes beyond the box, in units of `size`. It looks at a grid of places;
-// more of them would only refine a figure that is compared with 3.
+// Returns how far the surface goes beyond the box, in units of `size`. It looks at a grid of
+// places; more of them would only refine a figure that is compared with 3.
 double ReachBeyond(const HSplineSurface& surface, const Box3& box, double size) {
   constexpr int kCells = 64;  // along u and v
   double farthest = 0;
@@ -640,38 +642,40 @@ double ReachBeyond(const HSplineSurface& surface, const Box3& box, double size) 
   return farthest / size;
 }
 
-// The distances of the points that are no outliers, with their indices.
-struct CountedDistances {
+bool IsOutlier(const FitResult& fit, std::uint32_t k) {
+  return fit.automatic && std::ranges::binary_search(fit.automatic->outliers, k);
+}
+
+// The distances of the points that are no outliers.
+std::vector<double> CountedDistances(const FitResult& fit) {
   std::vector<double> distances_mm;
-  std::vector<std::uint32_t> points;
-};
-CountedDistances FindCounted(const FitResult& fit) {
-  CountedDistances counted;
+  distances_mm.reserve(fit.residual_mm.size());
   for (std::uint32_t k = 0; k < fit.residual_mm.size(); ++k) {
-    if (!fit.automatic || !std::ranges::binary_search(fit.automatic->outliers, k)) {
-      counted.distances_mm.push_back(fit.residual_mm[k]);
-      counted.points.push_back(k);
+    if (!IsOutlier(fit, k)) {
+      distances_mm.push_back(fit.residual_mm[k]);
     }
   }
-  return counted;
+  return distances_mm;
 }
 
 // Compares shapes, in the coordinates of the fit.
 void CompareShapes(const GivenPoints& given, bool has_heights, PointFit& result) {
   const double diagonal = given.box.diagonal().norm(), height = given.box.sizes().z();
-  result.reach = ReachBeyond(result.fit.surface, given.box,
-                             has_heights && height > 0 ? height : diagonal);
+  result.reach =
+      ReachBeyond(result.fit.surface, given.box, has_heights && height > 0 ? height : diagonal);
   result.off = given.has_uv && given.on_line
                    ? kNaN
-                   : RootMeanSquare(FindCounted(result.fit).distances_mm) / diagonal;
+                   : RootMeanSquare(CountedDistances(result.fit)) / diagonal;
 }
 
-double WeightedRms(const CountedDistances& counted, std::span<const double> weights) {
+// The same as RootMeanSquare(CountedDistances(fit)), with weights.
+double WeightedRms(const FitResult& fit, std::span<const double> weights) {
   double sum = 0, all = 0;
-  for (std::size_t n = 0; n < counted.points.size(); ++n) {
-    const double weight = weights[counted.points[n]];
-    sum += weight * counted.distances_mm[n] * counted.distances_mm[n];
-    all += weight;
+  for (std::uint32_t k = 0; k < weights.size(); ++k) {
+    if (!IsOutlier(fit, k)) {
+      sum += weights[k] * fit.residual_mm[k] * fit.residual_mm[k];
+      all += weights[k];
+    }
   }
   return std::sqrt(sum / all);
 }
@@ -679,14 +683,13 @@ double WeightedRms(const CountedDistances& counted, std::span<const double> weig
 // Compares distances, in the unit of the points.
 void CompareDistances(const GivenPoints& given, PointFit& result) {
   const std::optional<AutoReport>& report = result.fit.automatic;
-  const CountedDistances counted = FindCounted(result.fit);
   const std::span<const double> weights = given.weights;
   result.sigma_factor = given.has_sigma && report ? SigmaFactor(*report, weights) : kNaN;
   result.distance = ComputeQuantiles(result.fit);
   if (std::ranges::any_of(weights, [&](double weight) { return weight != weights[0]; })) {
-    result.weighted_rms_mm = WeightedRms(counted, weights);
+    result.weighted_rms_mm = WeightedRms(result.fit, weights);
   }
-  result.fit.point_rms_mm = RootMeanSquare(counted.distances_mm);
+  result.fit.point_rms_mm = RootMeanSquare(CountedDistances(result.fit));
   result.rms_of_all_mm = RootMeanSquare(result.fit.residual_mm);
 }
 
@@ -751,7 +754,7 @@ std::string TailText(const FitResult& fit, std::string_view unit) {
   if (!fit.automatic || fit.automatic->met_to_rounding) {
     return "";
   }
-  std::vector<double> distances = FindCounted(fit).distances_mm;
+  std::vector<double> distances = CountedDistances(fit);
   if (distances.empty()) {
     return "";
   }
@@ -856,11 +859,11 @@ std::vector<std::string> PointFit::Faults() const {
                     reach));
   }
   if (faults.empty() && off > kMostOff) {
-    faults.push_back(fmt::format(
-        "the points lie {} (RMS) from the surface, {:.3g} % of their extent, "
-        "as points that fill space or lie on several sheets do; give (u,v), other "
-        "parameters, one sheet alone, or finer levels if it is one",
-        LengthText(fit.point_rms_mm, unit, 3), 100 * off));
+    faults.push_back(
+        fmt::format("the points lie {} (RMS) from the surface, {:.3g} % of their extent, "
+                    "as points that fill space or lie on several sheets do; give (u,v), other "
+                    "parameters, one sheet alone, or finer levels if it is one",
+                    LengthText(fit.point_rms_mm, unit, 3), 100 * off));
   }
   return faults;
 }
@@ -885,8 +888,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   PreparedPoints placed = PlacePoints(table, out.given, options, step, context);
   std::vector<std::string> notes = FindNotes(table, out, placed, options);
   const bool has_heights = placed.shape.reference == OffsetReference::kWorld;
-  const double factor =
-      has_heights && table.exact.empty() ? HeightFactor(table.positions) : 1;
+  const double factor = has_heights && table.exact.empty() ? HeightFactor(table.positions) : 1;
   ScaleHeights(factor, table.positions);
   std::vector<Vec2>& uv = placed.parameters.uv;
   const HSplineSurface start = StartSurface(placed.shape, table.positions, uv);

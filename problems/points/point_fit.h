@@ -77,14 +77,15 @@ void Fields(Visitor& visit, PointFitOptions& o) {
                          "the surface, such as [intensity] or [red, green, blue]"},
         o.attributes);
   visit(FieldInfo{.name = "fit", .doc = "the fit; its finest level is that of the surface"}, o.fit);
-  visit(FieldInfo{.name = "chord_mm",
-                  .unit = "mm",
-                  .min = 1e-9,
-                  .max = 1e3,
-                  .doc = "largest distance of the triangles of surface.ply from the surface, along z "
-                         "for heights over x and y; auto: 1/5000 of the points' extent, or more if "
-                         "that would be millions of triangles"},
-        o.chord_mm);
+  visit(
+      FieldInfo{.name = "chord_mm",
+                .unit = "mm",
+                .min = 1e-9,
+                .max = 1e3,
+                .doc = "largest distance of the triangles of surface.ply from the surface, along z "
+                       "for heights over x and y; auto: 1/5000 of the points' extent, or more if "
+                       "that would be millions of triangles"},
+      o.chord_mm);
   visit(FieldInfo{.name = "unit",
                   .doc = "unit of the heights (of all coordinates, where they share one), which is "
                          "printed beside lengths, such as m; files of points do not state it, so "
@@ -120,9 +121,9 @@ struct PointFit {
   // The fit was done with z times this factor, so that the unit of z has no effect (HeightFactor).
   // All figures are in the unit of the points. 1 for surfaces that are no heights over x and y.
   double height_factor = 1;
-  double energy_weight = kNaN;         // of the thin-plate energy, as in AutoReport before terms
-  std::vector<double> weights = {};    // of all given points, NaN where left out; none if equal
-  MapFaults map_faults;    // of the map that was used
+  double energy_weight = kNaN;       // of the thin-plate energy, as in AutoReport before terms
+  std::vector<double> weights = {};  // of all given points, NaN where left out; none if equal
+  MapFaults map_faults;              // of the map that was used
   std::optional<FootMoves> moves =
       {};  // moves of (u,v) before the fit, if relaxation was asked for
   // point_rms_mm counts all points alike, outliers apart. The weights of smoothness are those that
@@ -151,8 +152,8 @@ struct PointFit {
   std::vector<StepTime> times;
 
   // The reasons why the result cannot be used; empty if it can. Besides the faults of the fit
-  // itself there are two: the surface goes three diagonals (or heights) beyond the points, where nothing holds
-  // it; or the points lie a tenth of the diagonal from it, as on no single sheet.
+  // itself there are two: the surface goes three diagonals (or heights) beyond the points, where
+  // nothing holds it; or the points lie a tenth of the diagonal from it, as on no single sheet.
   std::vector<std::string> Faults() const;
 };
 

@@ -150,9 +150,8 @@ FirstLineNames WithKnownNames(std::string_view first_line,
                               std::span<const std::string> attributes) {
   FirstLineNames names{std::string(first_line)};
   std::vector<std::string> taken(attributes.begin(), attributes.end());
-  ForEachName(first_line, [&](std::size_t, std::size_t, const std::string& name) {
-    taken.push_back(name);
-  });
+  ForEachName(first_line,
+              [&](std::size_t, std::size_t, const std::string& name) { taken.push_back(name); });
   ForEachName(first_line, [&](std::size_t begin, std::size_t end, const std::string& name) {
     const std::string coordinate(MapCoordinate(name));
     const auto is_taken = [&](std::string_view by) { return std::ranges::count(taken, by) > 0; };
@@ -423,8 +422,7 @@ PointTable ParsePointTable(std::string_view text, std::string_view name,
     return plain.Take();
   }
   FirstLineNames names = WithKnownNames(first_line, attributes);
-  PointTable table =
-      PointReader(names.line.append(rest), name, attributes, further).Read();
+  PointTable table = PointReader(names.line.append(rest), name, attributes, further).Read();
   table.has_map_columns = names.has_map_names;
   return table;
 }

@@ -51,10 +51,11 @@ void AddExact(PointTable& table, std::size_t point, const Vec3& normal);
 //   the normal of the surface at an exact point, of any length, or 0, 0, 0;
 // - the attributes.
 // The names may be in capitals. Names of maps also mean x (lon, longitude, long, easting, east), y
-// (lat, latitude, northing, north) and z (depth, height, elevation, elev, altitude), unless there is
-// a column x, y or z or an attribute of that name. Colours, an intensity and other numbers that scanners write (such
-// as r, g, b, intensity) have no effect, which a note states; with FurtherColumns::kAny this holds
-// for every further column. Each further line has one decimal number per column. Throws IoError
+// (lat, latitude, northing, north) and z (depth, height, elevation, elev, altitude), unless there
+// is a column x, y or z or an attribute of that name. Colours, an intensity and other numbers that
+// scanners write (such as r, g, b, intensity) have no effect, which a note states; with
+// FurtherColumns::kAny this holds for every further column. Each further line has one decimal
+// number per column. Throws IoError
 // (`name:line: what`) for any other column, a repeated column, an attribute without a column, a
 // line with more or fewer entries, an empty line before the end, an entry that is no finite number,
 // a weight or sigma that is not positive, an exact that is neither 0 nor 1, and a table without
@@ -76,7 +77,7 @@ struct PointColumns {
   // A PointColumn, kPointColumns + the index of an attribute, or Kinds() for one without effect.
   std::vector<std::size_t> kinds;
   std::vector<std::string> attributes;
-  std::string note = {};  // names the columns without effect; empty if there are none
+  std::string note = {};       // names the columns without effect; empty if there are none
   bool has_map_names = false;  // PointTable::has_map_columns
 
   std::size_t Kinds() const { return kPointColumns + attributes.size(); }

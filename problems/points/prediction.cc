@@ -83,8 +83,7 @@ HeightPredictor::HeightPredictor(HSplineSurface surface, std::optional<HeightEvi
     return;
   }
   sigma_ = std::make_shared<const SurfaceSigma>(
-      surface_,
-      AttributeColumns{.uv = evidence_->uv, .weights = evidence_->weights, .columns = {}},
+      surface_, AttributeColumns{.uv = evidence_->uv, .weights = evidence_->weights, .columns = {}},
       std::span<const std::uint32_t>(),
       SigmaOptions{.noise_mm = evidence_->noise_mm,
                    .weight = evidence_->energy_weight,
@@ -102,11 +101,11 @@ HeightPredictor::NoiseGrid HeightPredictor::FindNoise() const {
   constexpr double kPointsPerCell = 64, kPointsOfAll = 16;
   constexpr int kMostAcross = 64;
   const std::vector<double>& residuals = evidence_->residual_mm;
-  NoiseGrid grid{.across = std::clamp(
-                     static_cast<int>(std::sqrt(static_cast<double>(residuals.size()) /
-                                                kPointsPerCell)),
-                     1, kMostAcross),
-                 .sd = {}};
+  NoiseGrid grid{
+      .across = std::clamp(
+          static_cast<int>(std::sqrt(static_cast<double>(residuals.size()) / kPointsPerCell)), 1,
+          kMostAcross),
+      .sd = {}};
   const std::size_t cells = static_cast<std::size_t>(grid.across) * grid.across;
   const double all = MeanSquare(residuals),
                spent = all > 0 ? evidence_->noise_mm * evidence_->noise_mm / all : 1;
@@ -125,7 +124,8 @@ HeightPredictor::NoiseGrid HeightPredictor::FindNoise() const {
 double HeightPredictor::NoiseGrid::At(const Vec2& uv) const { return sd[CellAt(uv, across)]; }
 
 // A place is supported if the surface is known at least as well as by one observation, or if its sd
-// is at most twice the 95 % quantile of the points'. The latter keeps borders of data without noise.
+// is at most twice the 95 % quantile of the points'. The latter keeps borders of data without
+// noise.
 double HeightPredictor::FindLimit() const {
   constexpr std::size_t kSample = 5000;  // points; bounds the time
   constexpr double kOfPoints = 2, kShare = 0.95;
@@ -260,8 +260,9 @@ std::optional<HeightEvidence> ReadEvidence(const fs::path& folder, std::string& 
   const nlohmann::json json = nlohmann::json::parse(ReadFileBytes(result), nullptr, false);
   if (!json.is_object() || !json.contains("automatic") ||
       !json["automatic"].contains("energy_weight")) {
-    note = "the fit beside the surface was not by plan: auto with solver: fastest: no sd, and no "
-           "intervals";
+    note =
+        "the fit beside the surface was not by plan: auto with solver: fastest: no sd, and no "
+        "intervals";
     return std::nullopt;
   }
   const nlohmann::json& automatic = json["automatic"];
@@ -338,8 +339,8 @@ std::string PredictionCsv(std::span<const Vec2> xy, const PredictedHeights& heig
 std::string PredictionNpy(std::span<const Vec2> xy, const PredictedHeights& heights) {
   static_assert(std::endian::native == std::endian::little);
   constexpr std::size_t kColumns = 7, kAlignment = 64, kPrefix = 10;
-  std::string head = fmt::format(
-      "{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {}), }}", xy.size(), kColumns);
+  std::string head = fmt::format("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, {}), }}",
+                                 xy.size(), kColumns);
   head.append(kAlignment - 1 - (kPrefix + head.size()) % kAlignment, ' ');
   head += '\n';
   std::string bytes("\x93NUMPY\x01\x00", 8);
@@ -347,9 +348,13 @@ std::string PredictionNpy(std::span<const Vec2> xy, const PredictedHeights& heig
   bytes += static_cast<char>(head.size() >> 8);
   bytes += head;
   for (std::size_t k = 0; k < xy.size(); ++k) {
-    const std::array<double, kColumns> row = {
-        xy[k].x(),      xy[k].y(),       heights.z[k], heights.sd[k],
-        heights.low[k], heights.high[k], static_cast<double>(heights.supported[k])};
+    const std::array<double, kColumns> row = {xy[k].x(),
+                                              xy[k].y(),
+                                              heights.z[k],
+                                              heights.sd[k],
+                                              heights.low[k],
+                                              heights.high[k],
+                                              static_cast<double>(heights.supported[k])};
     std::array<char, sizeof row> raw;
     std::memcpy(raw.data(), row.data(), sizeof row);
     bytes.append(raw.data(), raw.size());

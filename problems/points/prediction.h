@@ -20,8 +20,8 @@ struct HeightEvidence {
   std::vector<Vec2> uv = {};
   std::vector<double> residual_mm = {};
   std::vector<double> weights = {};  // one per point, or none
-  double noise_mm = kNaN;       // AutoReport
-  double energy_weight = kNaN;  // PointFit
+  double noise_mm = kNaN;            // AutoReport
+  double energy_weight = kNaN;       // PointFit
   double stretch = 1, direction_deg = 0;
   double effective_share = 1;  // AutoReport
 };
@@ -36,12 +36,12 @@ struct PredictedHeights {
 };
 
 // Predicts z over x and y.
-//   sd: the error of the surface (surface_sigma.h), times the ratio of the noise around the place to
-//   the noise of all points, and over the square root of the effective share of the points.
-//   interval: z -+ q sqrt(noise^2 + sd^2), where q is the quantile of the points' own distances over
-//   the noise around them, so that it holds for long tails too.
-//   supported: the surface is known at least as well as by one observation, or nearly as well as at
-//   the points. Without evidence: within the domain.
+//   sd: the error of the surface (surface_sigma.h), times the ratio of the noise around the place
+//   to the noise of all points, and over the square root of the effective share of the points.
+//   interval: z -+ q sqrt(noise^2 + sd^2), where q is the quantile of the points' own distances
+//   over the noise around them, so that it holds for long tails too. supported: the surface is
+//   known at least as well as by one observation, or nearly as well as at the points. Without
+//   evidence: within the domain.
 class HeightPredictor {
  public:
   // Throws InputError for a surface that is no graph over x and y, and as SurfaceSigma does.
@@ -79,7 +79,8 @@ struct FittedHeights {
 // Throws IoError for files that cannot be read or hold something else.
 FittedHeights ReadFittedHeights(const std::filesystem::path& path);
 
-// The nodes of a square grid over the domain, from its lowest x and y, row by row from the lowest y.
+// The nodes of a square grid over the domain, from its lowest x and y, row by row from the lowest
+// y.
 struct PlaceGrid {
   double step = kNaN;
   int columns = 0, rows = 0;

@@ -77,7 +77,8 @@ std::string LegendHtml(const Legend& legend) {
       "style=\"background:linear-gradient(to right,{})\"></div><div "
       "class=\"view3d-ticks\">{}</div>{}</div>",
       EscapeHtml(legend.title),
-      legend.unit.empty() ? "" : fmt::format(" ({})", EscapeHtml(legend.unit)), fmt::join(ColourSteps(legend.map), ","), LegendTicks(legend.map),
+      legend.unit.empty() ? "" : fmt::format(" ({})", EscapeHtml(legend.unit)),
+      fmt::join(ColourSteps(legend.map), ","), LegendTicks(legend.map),
       legend.shows_no_data ? fmt::format("<small><i style=\"background:{}\"></i>no data</small>",
                                          HexText(kNoDataColour))
                            : "");

@@ -91,11 +91,11 @@ void BindFit(py::module_& module) {
       .def_property_readonly("rms_mm", [](const PointFit& f) { return f.fit.point_rms_mm; })
       .def_property_readonly("parameters", [](const PointFit& f) { return f.parameters; })
       .def_property_readonly("usable", [](const PointFit& f) { return f.Faults().empty(); })
-      .def("predict", &PredictHeights, py::arg("xy"), py::arg("level") = 0.9,
-           py::arg("threads") = 1,
-           "Heights at n x 2 places, for a fit of heights over x and y: a dictionary of n numbers "
-           "each: z, sd (of the surface), low and high (interval for a new observation, which holds "
-           "the share `level`) and supported (False where the points do not support z).")
+      .def(
+          "predict", &PredictHeights, py::arg("xy"), py::arg("level") = 0.9, py::arg("threads") = 1,
+          "Heights at n x 2 places, for a fit of heights over x and y: a dictionary of n numbers "
+          "each: z, sd (of the surface), low and high (interval for a new observation, which holds "
+          "the share `level`) and supported (False where the points do not support z).")
       .def_property_readonly("faults", &PointFit::Faults,
                              "reasons why the result cannot be used, or empty");
   module.def("fit", &FitArrays, py::arg("points"), py::arg("uv") = py::none(),

@@ -66,6 +66,10 @@ TEST(ErrorStructure, AStepIsFoundOnlyWhereManyPointsShareTheirHeights) {
   EXPECT_EQ(FindLatticeStep(fine), 0);
   EXPECT_EQ(FindLatticeStep(free), 0);
   EXPECT_EQ(FindLatticeStep(std::vector<Vec3>(100, Vec3(1, 2, 3))), 0);
+  for (Vec3& p : whole) {
+    p.z() = std::round(p.z() / 1000);  // one terrace
+  }
+  EXPECT_EQ(FindLatticeStep(whole), 0);
 }
 
 // Whole numbers: the surface does not follow the steps, and the noise is that of the rounding.

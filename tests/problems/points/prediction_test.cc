@@ -13,6 +13,7 @@
 #include <string>
 #include <vector>
 
+#include "problems/points/fit_files.h"
 #include "problems/points/fit_report.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/npy.h"
@@ -91,6 +92,23 @@ TEST(HeightField, LengthsHaveTheUnitThatIsStated) {
   EXPECT_THAT(AutoText(*metres.fit.automatic, metres.unit), HasSubstr(" m per coordinate"));
 }
 
+// A surface with more patches than the mesh should have cells gets one cell for each patch.
+TEST(HeightField, AManyPatchedSurfaceHasAChord) {
+  const HSplineShape shape{.patches_u = 800, .patches_v = 800, .max_level = 0};
+  ControlNet net{shape.Columns(0), shape.Rows(0), {}};
+  for (int j = 0; j < net.rows; ++j) {
+    for (int i = 0; i < net.columns; ++i) {
+      net.vertices.emplace_back(i, j, (i * 7 + j * 13) % 5);
+    }
+  }
+  PointFit fit = FitPoints(MapTable(100, 20, 12), {}, {});
+  fit.fit.surface = HSplineSurface(shape, net);
+  fit.height_factor = 1;
+  const double chord = ChooseChord(fit, AutoOr<double>::Auto());
+  EXPECT_LT(chord, 100);
+  EXPECT_LE(CellsToChord(fit.fit.surface, chord), 640'000);
+}
+
 // Intervals hold their share of new observations and of the truth, also where noise differs.
 TEST(Prediction, IntervalsHoldTheirShare) {
   PointTable table = MapTable(6000, 0, 8);
@@ -166,8 +184,8 @@ TEST(Prediction, FilesGiveThePredictionOfTheFit) {
 
 TEST(Prediction, ASurfaceThatIsNoHeightIsRefused) {
   const HSplineShape shape{.patches_u = 8, .patches_v = 8, .max_level = 0};
-  const std::vector<Vec3> one_place(
-      static_cast<std::size_t>(shape.Columns(0)) * shape.Rows(0), Vec3(1, 2, 3));
+  const std::vector<Vec3> one_place(static_cast<std::size_t>(shape.Columns(0)) * shape.Rows(0),
+                                    Vec3(1, 2, 3));
   const HSplineSurface point(shape, ControlNet{shape.Columns(0), shape.Rows(0), one_place});
   EXPECT_THROW(HeightPredictor(point, std::nullopt), InputError);
 }
