@@ -11,6 +11,7 @@
 #include <fstream>
 #include <iostream>
 #include <iterator>
+#include <map>
 #include <numeric>
 #include <optional>
 #include <string_view>
@@ -106,6 +107,14 @@ PointTable ParseXyz(std::string_view text, const std::string& name) {
 }
 
 std::string_view FirstLine(std::string_view text) { return text.substr(0, text.find('\n')); }
+
+// Returns whether a first line begins with a number, so that no column has a name.
+bool IsBare(std::string_view line) {
+  const std::size_t first = line.find_first_not_of(" \t\xEF\xBB\xBF\"");
+  return first != line.npos &&
+         (std::isdigit(static_cast<unsigned char>(line[first])) != 0 ||
+          std::string_view("+-.").find(line[first]) != std::string_view::npos);
+}
 
 // Returns whether a first line names columns: it is no comment, and begins with a letter or with
 // //.
@@ -355,10 +364,75 @@ PointTable ParsePlyPoints(std::string_view bytes, const std::string& name,
   return table;
 }
 
+// Reads a table without names of columns: x, y, z and further numbers with commas, semicolons or
+// blanks between them.
+PointTable ParseBare(const std::string& bytes, const std::string& name) {
+  const std::string_view first = FirstLine(bytes);
+  std::string text = first.find(';') == first.npos ? bytes : WithoutSemicolons(bytes);
+  std::ranges::replace(text, ',', ' ');
+  PointTable table = ParseXyz(text, name);
+  table.first_line = 1;
+  table.notes.insert(table.notes.begin(),
+                     "the file names no columns: the first three are taken for x, y and z");
+  return table;
+}
+
+// Reads the points of a .pts: their number, then x, y, z and further numbers on each line.
+PointTable ParsePts(const std::string& bytes, const std::string& name) {
+  const std::string_view first = FirstLine(bytes);
+  const bool has_count = first.find_first_not_of("0123456789 \t\r") == first.npos &&
+                         first.find_first_of(" \t") == first.npos;
+  return ParseXyz(has_count && first.size() < bytes.size() ? bytes.substr(first.size() + 1) : bytes,
+                  name);
+}
+
+// Reads the nodes of an ASCII grid of ESRI, without those that have no data.
+PointTable ParseEsriGrid(const std::string& bytes, const std::string& name) {
+  TextLines lines(bytes, name, {.comment = '#'});
+  std::map<std::string, double> head;
+  const auto value = [&](const char* key, double otherwise) {
+    return head.contains(key) ? head[key] : otherwise;
+  };
+  PointTable table;
+  double rows = 0, columns = 0;
+  for (double row = 0; lines.NextLine();) {
+    if (row == 0 && NamesColumns(lines.RestOfLine())) {
+      const std::string key = LowerCase(std::string(lines.NextWord()));
+      head[key] = NextFinite(lines);
+      continue;
+    }
+    columns = value("ncols", 0);
+    rows = value("nrows", 0);
+    const double step = value("cellsize", kNaN), half = step / 2,
+                 left = value("xllcenter", value("xllcorner", 0) + half),
+                 low = value("yllcenter", value("yllcorner", 0) + half);
+    double column = 0;
+    for (; !lines.AtLineEnd(); ++column) {
+      const double z = NextFinite(lines);
+      if (z != value("nodata_value", -9999)) {
+        table.positions.emplace_back(left + step * column, low + step * (rows - 1 - row), z);
+      }
+    }
+    if (column != columns) {
+      lines.Fail(fmt::format("{} numbers, and ncols is {}; give each row of the grid one line",
+                             column, columns));
+    }
+    ++row;
+  }
+  return table;
+}
+
 PointTable ParseUnnamed(const std::string& bytes, const std::string& ending,
                         const std::string& name) {
   if (ending == ".xyz") {
     return ParseXyz(bytes, name);
+  }
+  if (ending == ".pts") {
+    return ParsePts(bytes, name);
+  }
+  if (ending == ".asc") {
+    return LowerCase(bytes.substr(0, 5)) == "ncols" ? ParseEsriGrid(bytes, name)
+                                                    : ParseXyz(bytes, name);
   }
   if (ending == ".npy") {
     return ParseNpyPoints(bytes, name);
@@ -369,10 +443,10 @@ PointTable ParseUnnamed(const std::string& bytes, const std::string& ending,
   if (ending == ".stl" || ending == ".off") {
     return PointsOf(ending == ".stl" ? ReadStl(bytes, name) : ReadOff(bytes, name));
   }
-  throw IoError(
-      fmt::format("{}: files of points end in .csv, .txt, .xyz, .npy, .ply, .obj, .stl or .off, "
-                  "or in one of these and .gz; or give - for a CSV on standard input",
-                  name));
+  throw IoError(fmt::format(
+      "{}: files of points end in .csv, .txt, .xyz, .pts, .asc, .npy, .ply, .obj, .stl or .off, "
+      "or in one of these and .gz; or give - for a CSV on standard input",
+      name));
 }
 
 // Merges corners at the same place into one point if each triangle has corners of its own, as in an
@@ -415,16 +489,19 @@ PointTable Parse(const std::string& bytes, const std::filesystem::path& path,
                  std::span<const std::string> attributes) {
   const std::string name = path.string(), ending = LowerCase(path.extension().string());
   const std::string_view first = FirstLine(bytes);
-  const bool is_bare = ending == ".txt" && !NamesColumns(first) && first.find(',') == first.npos;
-  const bool is_named = ending == ".xyz" && NamesColumns(first);
-  if (is_named || name == "-" || ((ending == ".csv" || ending == ".txt") && !is_bare)) {
+  const bool is_table = name == "-" || ending == ".csv" || ending == ".txt",
+             is_bare = is_table && (IsBare(first) || (ending == ".txt" && !NamesColumns(first) &&
+                                                      first.find(',') == first.npos)),
+             is_named = (ending == ".xyz" || ending == ".pts" || ending == ".asc") &&
+                        NamesColumns(first) && LowerCase(bytes.substr(0, 5)) != "ncols";
+  if (is_named || (is_table && !is_bare)) {
     return ParseTable(bytes, name == "-" ? "standard input" : name, attributes);
   }
   if (ending == ".ply") {
     return NonEmpty(ParsePlyPoints(bytes, name, attributes), name);
   }
   PointTable table =
-      NonEmpty(is_bare ? ParseXyz(bytes, name) : ParseUnnamed(bytes, ending, name), name);
+      NonEmpty(is_bare ? ParseBare(bytes, name) : ParseUnnamed(bytes, ending, name), name);
   if (!attributes.empty()) {
     throw InputError(
         fmt::format("{}: it has no '{}', which the option `attributes` names; give a CSV or PLY",
@@ -467,8 +544,8 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
     std::size_t begin = 0;
     if (!points) {
       begin = all.find('\n') + 1;
-      if (begin == 0 || all.substr(0, begin).find(',') == all.npos) {
-        return std::nullopt;  // one line, or another separator
+      if (begin == 0 || all.substr(0, begin).find(',') == all.npos || IsBare(all)) {
+        return std::nullopt;  // one line, another separator, or no names
       }
       points.emplace(ReadPointColumns(all.substr(0, begin - 1), path.string(), attributes));
     }
@@ -544,7 +621,9 @@ PointFile ReadPointFile(const std::filesystem::path& path,
                         std::span<const std::string> attributes) {
   PointFile file = ReadAnyPointFile(path, attributes);
   file.points.file = path == "-" ? "standard input" : path.string();
-  file.points.first_line = IsTable(path) ? 2 : 0;
+  if (file.points.first_line == 0) {
+    file.points.first_line = IsTable(path) ? 2 : 0;
+  }
   CheckReach(file.points);
   WeldCorners(file.points);
   return file;

@@ -140,8 +140,8 @@ struct PointFit {
   // Noise of the points over the given sigma, outliers apart; NaN without given sigma, and for
   // other plans than auto.
   double sigma_factor = kNaN;
-  // How far the surface goes beyond the points' box, in diagonals of the box, or for heights over x
-  // and y in its heights.
+  // The distance that the surface goes beyond the points' box, in diagonals of the box. Heights
+  // over x and y count in heights of the box.
   double reach = kNaN;
   double off = kNaN;  // RMS distance of the points in diagonals of the box, outliers apart; NaN for
                       // given (u,v) if the points lie on a line

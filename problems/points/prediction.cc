@@ -54,7 +54,7 @@ int CellAt(const Vec2& uv, int across) {
 
 }  // namespace
 
-HeightEvidence EvidenceOf(const PointFit& fit) {
+HeightEvidence CollectEvidence(const PointFit& fit) {
   const AutoReport& report = fit.fit.automatic.value();
   std::vector<char> counts(fit.fit.uv.size(), 1);
   for (const std::vector<std::uint32_t>* const indices : {&report.outliers, &report.repeated}) {

@@ -25,7 +25,7 @@ struct HeightEvidence {
   double stretch = 1, direction_deg = 0;
   double effective_share = 1;  // AutoReport
 };
-HeightEvidence EvidenceOf(const PointFit& fit);
+HeightEvidence CollectEvidence(const PointFit& fit);
 
 // One entry per place. NaN beyond the domain of the surface.
 struct PredictedHeights {

@@ -56,7 +56,7 @@ py::dict PredictHeights(const PointFit& fit, const Doubles& xy, double level, in
   }
   const std::vector<Vec2> places = Points2(xy, "xy");
   const PredictedHeights heights =
-      HeightPredictor(fit.fit.surface, EvidenceOf(fit)).At(places, level, threads);
+      HeightPredictor(fit.fit.surface, CollectEvidence(fit)).At(places, level, threads);
   py::array_t<bool> supported(static_cast<py::ssize_t>(heights.supported.size()));
   std::ranges::transform(heights.supported, supported.mutable_data(),
                          [](char flag) { return flag != 0; });

@@ -146,6 +146,26 @@ TEST_F(PointFiles, EveryFormatGivesTheSamePoints) {
   }
 }
 
+// Tables of other programs: without names, with a count, as a grid.
+TEST_F(PointFiles, FilesWithoutNamesHaveTheirCoordinatesFirst) {
+  const std::vector<Vec3> points = {{1, 2, 3}, {-4, 5.5, 6}};
+  for (const auto& [name, bytes] :
+       std::map<std::string, std::string>{{"a.csv", "1,2,3,7\n-4,5.5,6,8\n"},
+                                          {"b.csv", "1;2;3\n-4;5,5;6\n"},
+                                          {"c.txt", "1 2 3\n-4 5.5 6\n"},
+                                          {"d.pts", "2\n1 2 3 0 9 9 9\n-4 5.5 6 0 9 9 9\n"},
+                                          {"e.asc", "1 2 3\n-4 5.5 6\n"}}) {
+    SCOPED_TRACE(name);
+    EXPECT_EQ(Read(name, bytes).positions, points);
+  }
+  const std::string grid =
+      "ncols 2\nnrows 2\nxllcorner 10\nyllcorner 20\ncellsize 2\nNODATA_value -9999\n"
+      "1 2\n-9999 4\n";
+  EXPECT_THAT(Read("g.asc", grid).positions,
+              ::testing::ElementsAre(Vec3(11, 23, 1), Vec3(13, 23, 2), Vec3(13, 21, 4)));
+  EXPECT_THAT(Refusal("h.asc", grid + "5\n"), HasSubstr("ncols"));
+}
+
 TEST_F(PointFiles, ACompressedFileGivesTheSamePoints) {
   for (const auto& [name, bytes] : std::map<std::string, std::string>{
            {"a.csv", Csv()}, {"a.npy", Npy(5)}, {"a.ply", PlainPly()}, {"a.xyz", Xyz()}}) {

@@ -118,7 +118,7 @@ TEST(Prediction, IntervalsHoldTheirShare) {
     p.z() += noise_at(p.x()) * random.Normal();
   }
   const PointFit fit = FitPoints(table, {}, {});
-  const HeightPredictor predictor(fit.fit.surface, EvidenceOf(fit));
+  const HeightPredictor predictor(fit.fit.surface, CollectEvidence(fit));
   for (const bool rougher : {false, true}) {
     std::vector<Vec2> places;
     for (int k = 0; k < 1500; ++k) {
@@ -145,7 +145,7 @@ TEST(Prediction, PlacesWithoutPointsAreNotSupported) {
   PointTable table = MapTable(6000, 5, 10);
   std::erase_if(table.positions, [](const Vec3& p) { return p.x() > 247 && p.x() < 251; });
   const PointFit fit = FitPoints(table, {}, {});
-  const HeightPredictor predictor(fit.fit.surface, EvidenceOf(fit));
+  const HeightPredictor predictor(fit.fit.surface, CollectEvidence(fit));
   const std::vector<Vec2> places = {{246, 24}, {252, 24}, {249, 24}, {260, 24}};
   const PredictedHeights heights = predictor.At(places, 0.9, 1);
   EXPECT_THAT(heights.supported, ::testing::ElementsAre(1, 1, 0, 0));
@@ -165,7 +165,7 @@ TEST(Prediction, FilesGiveThePredictionOfTheFit) {
   FittedHeights fitted = ReadFittedHeights(folder);
   ASSERT_TRUE(fitted.evidence);
   const HeightPredictor from_files(std::move(fitted.surface), std::move(fitted.evidence)),
-      from_fit(fit.fit.surface, EvidenceOf(fit));
+      from_fit(fit.fit.surface, CollectEvidence(fit));
   const PlaceGrid grid = MakePlaceGrid(from_fit.map(), 1.5);
   const std::vector<Vec2> places = grid.Places();
   const PredictedHeights a = from_files.At(places, 0.9, 1), b = from_fit.At(places, 0.9, 1);
