@@ -113,6 +113,19 @@ class Fit(unittest.TestCase):
         self.assertLess(found.residuals_mm.max(), 0.02)
         np.testing.assert_allclose(np.linalg.norm(found.surface.points(found.uv) - points, axis=1), found.residuals_mm, atol=1e-9)
 
+    def test_heights_are_predicted_with_their_uncertainty(self):
+        random = np.random.default_rng(5)
+        xy = random.uniform(0, 10, (3000, 2))
+        height = lambda at: 50 * np.sin(at[:, 0] / 2) + 3 * at[:, 1]
+        found = semblance.fit(np.column_stack([xy, height(xy) + random.normal(0, 1, 3000)]))
+        places = np.array([[3.0, 4.0], [7.0, 2.0], [30.0, 2.0]])
+        there = found.predict(places, level=0.95)
+        np.testing.assert_allclose(there["z"][:2], height(places)[:2], atol=0.6)
+        self.assertTrue((there["low"][:2] < there["z"][:2] - 1.5).all() and (there["high"][:2] < there["z"][:2] + 2.6).all())
+        self.assertTrue((there["sd"][:2] < 0.4).all())
+        np.testing.assert_array_equal(there["supported"], [True, True, False])
+        self.assertTrue(np.isnan(there["z"][2]))
+
     def test_given_parameters_are_kept(self):
         points = paraboloid(21)
         uv = (points[:, :2] + 20) / 40
