@@ -68,9 +68,26 @@ bool LieAlongLines(const NestedPoints& points) {
   return !ratios.empty() && UpperMedian(ratios) < kNarrow;
 }
 
+namespace {
+
+// Returns whether the way of the points turns back at the n-th, as at the end of a line that is
+// followed by the next in the other direction.
+bool TurnsBack(const NestedPoints& points, const std::vector<std::uint32_t>& order, std::size_t n) {
+  constexpr std::size_t kAlong = 4;  // points on each side; fewer turn by chance
+  constexpr double kBack = -0.7;     // cosine
+  if (n < kAlong || n + kAlong >= order.size()) {
+    return false;
+  }
+  const auto place = [&](std::size_t k) { return Vec2(points.X(order[k]), points.Y(order[k])); };
+  const Vec2 before = place(n - 1) - place(n - kAlong), after = place(n + kAlong) - place(n);
+  return before.dot(after) < kBack * before.norm() * after.norm();
+}
+
+}  // namespace
+
 FileRuns FindFileRuns(const NestedPoints& points) {
   constexpr double kNeighbour = 0.05;  // of the domain's diagonal: the largest median step
-  constexpr double kFar = 6;           // median steps between two runs
+  constexpr double kFar = 20;          // median steps between two runs
   constexpr std::size_t kShortest = 8, kFewestRuns = 20;
   constexpr std::size_t kMostPoints = 2'000'000;  // bounds the memory
   if (points.size() > kMostPoints) {
@@ -93,9 +110,13 @@ FileRuns FindFileRuns(const NestedPoints& points) {
   if (!(median > 0 && median < kNeighbour * points.patches.norm())) {
     return {};
   }
+  const auto ends_before = [&](std::size_t begin, std::size_t n) {
+    return !(steps[n - 1] < kFar * median) ||
+           (n - begin >= kShortest && TurnsBack(points, curve_of, n));
+  };
   FileRuns runs{.run = std::vector<std::uint32_t>(points.size(), FileRuns::kNone)};
   for (std::size_t begin = 0, end = 1; begin < curve_of.size(); begin = end, ++end) {
-    while (end < curve_of.size() && steps[end - 1] < kFar * median) {
+    while (end < curve_of.size() && !ends_before(begin, end)) {
       ++end;
     }
     for (std::size_t n = begin; n < end && end - begin >= kShortest; ++n) {

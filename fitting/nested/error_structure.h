@@ -28,7 +28,7 @@ struct FileRuns {
   static constexpr std::uint32_t kNone = 0xffffffff;
 };
 // Finds the runs of a file in which consecutive points are neighbours; a run ends where the next
-// point is far away. No runs if the file has another order, or fewer than twenty runs, or
+// point is far away, or where the way turns back. No runs if the file has another order, or fewer than twenty runs, or
 // more than two million points.
 FileRuns FindFileRuns(const NestedPoints& points);
 

@@ -609,24 +609,17 @@ class NestedFitter {
   // random points held out. Detail varies along the runs; where the means of the runs explain
   // little of the residuals, the weight stays.
   double WeightByRuns() {
-    constexpr double kFactor = 8, kMaxRatio = 1e9;
     runs_ = FindFileRuns(points_);
     if (runs_.count == 0) {
       return weight_;
     }
+    const NestedSolve::Packed solution = solve_.Solution();
     const RunSplit split = SplitRuns();
     solve_.Begin(space_, PointChoice{.left_out = split.not_fitted}, metric_);
-    std::vector<double> best = RunSquares(split, weight_);
-    double weight = weight_;
-    for (double next = kFactor * weight_; next < kMaxRatio * weight_; next *= kFactor) {
-      const std::vector<double> squares = RunSquares(split, next);
-      if (!IsClearlyLess(squares, best)) {
-        break;
-      }
-      best = squares;
-      weight = next;
-    }
-    return weight > weight_ && RunsShareErrors(split, weight) ? weight : weight_;
+    const double weight = SmoothestByRuns(split);
+    solve_.Enter(space_);
+    solve_.SetSolution(solution);
+    return weight;
   }
 
   struct RunSplit {
@@ -642,6 +635,21 @@ class NestedFitter {
       split.not_held[k] |= is_held ? 0 : 1;
     }
     return split;
+  }
+
+  double SmoothestByRuns(const RunSplit& split) {
+    constexpr double kFactor = 8, kMaxRatio = 1e9;
+    std::vector<double> best = RunSquares(split, weight_);
+    double weight = weight_;
+    for (double next = kFactor * weight_; next < kMaxRatio * weight_; next *= kFactor) {
+      const std::vector<double> squares = RunSquares(split, next);
+      if (!IsClearlyLess(squares, best)) {
+        break;
+      }
+      best = squares;
+      weight = next;
+    }
+    return weight > weight_ && RunsShareErrors(split, weight) ? weight : weight_;
   }
 
   // The mean squares of the held-out runs at a weight; NaN for the others.
