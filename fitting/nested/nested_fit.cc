@@ -639,17 +639,33 @@ class NestedFitter {
 
   double SmoothestByRuns(const RunSplit& split) {
     constexpr double kFactor = 8, kMaxRatio = 1e9;
-    std::vector<double> best = RunSquares(split, weight_);
+    constexpr double kTurned = 1.2;  // a mean square that has clearly risen above the least
+    const std::vector<double> start = RunSquares(split, weight_);
+    std::vector<double> best = start;
     double weight = weight_;
     for (double next = kFactor * weight_; next < kMaxRatio * weight_; next *= kFactor) {
       const std::vector<double> squares = RunSquares(split, next);
-      if (!IsClearlyLess(squares, best)) {
+      const double mean = FiniteMean(squares), least = FiniteMean(best);
+      if (mean > kTurned * least) {
         break;
       }
-      best = squares;
-      weight = next;
+      if (mean < least) {
+        best = squares;
+        weight = next;
+      }
     }
-    return weight > weight_ && RunsShareErrors(split, weight) ? weight : weight_;
+    return weight > weight_ && IsClearlyLess(best, start) && RunsShareErrors(split, weight)
+               ? weight
+               : weight_;
+  }
+
+  static double FiniteMean(const std::vector<double>& values) {
+    double sum = 0, count = 0;
+    for (const double value : values) {
+      sum += std::isfinite(value) ? value : 0;
+      count += std::isfinite(value) ? 1 : 0;
+    }
+    return sum / count;
   }
 
   // The mean squares of the held-out runs at a weight; NaN for the others.
@@ -679,7 +695,7 @@ class NestedFitter {
   }
 
   static bool IsClearlyLess(const std::vector<double>& next, const std::vector<double>& best) {
-    constexpr double kErrors = 2;
+    constexpr double kErrors = 1;  // few runs are held out; RunsShareErrors must hold too
     double sum = 0, squares = 0, count = 0;
     for (std::size_t n = 0; n < next.size(); ++n) {
       if (const double gain = best[n] - next[n]; std::isfinite(gain)) {
@@ -693,7 +709,7 @@ class NestedFitter {
 
   // Returns whether the means of the held-out runs explain much of their residuals.
   bool RunsShareErrors(const RunSplit& split, double weight) {
-    constexpr double kShare = 0.3;  // detail with some waves along a run has next to none
+    constexpr double kShare = 0.5;  // detail with some waves along a run has next to none
     std::vector<Vec3> sums(runs_.count, Vec3::Zero());
     std::vector<double> counts(runs_.count, 0);
     double squares = 0, of_means = 0;
