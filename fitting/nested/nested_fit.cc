@@ -637,18 +637,15 @@ class NestedFitter {
     return split;
   }
 
+  // The mean square may rise before it falls: half-smoothed lines swing between their neighbours.
   double SmoothestByRuns(const RunSplit& split) {
-    constexpr double kFactor = 8, kMaxRatio = 1e9;
-    constexpr double kTurned = 1.2;  // a mean square that has clearly risen above the least
+    constexpr double kFactor = 8, kMaxRatio = 1e8;
     const std::vector<double> start = RunSquares(split, weight_);
     std::vector<double> best = start;
     double weight = weight_;
     for (double next = kFactor * weight_; next < kMaxRatio * weight_; next *= kFactor) {
       const std::vector<double> squares = RunSquares(split, next);
       const double mean = FiniteMean(squares), least = FiniteMean(best);
-      if (mean > kTurned * least) {
-        break;
-      }
       if (mean < least) {
         best = squares;
         weight = next;
