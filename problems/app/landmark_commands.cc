@@ -21,6 +21,7 @@
 #include "problems/report/site_page.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/propose/propose_landmarks.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/join_copies.h"
@@ -98,27 +99,43 @@ void DeclareConvert(CLI::App& convert, CommandLine& line) {
 
 // The arguments of `landmarks propose`.
 struct ProposeArguments {
-  std::string skull, out, compare;
+  std::string skull, landmarks, out, compare;
   std::vector<std::pair<std::string, std::string>> references;  // skull, landmarks
   int threads = DefaultThreads();
   bool force = false, quiet = false;
   std::stop_token stop;
 };
 
-// Without a given reference the references are two phantoms.
 std::vector<ReferenceHead> ReadReferences(const ProposeArguments& a) {
   std::vector<ReferenceHead> heads;
   for (const auto& [skull, landmarks] : a.references) {
     heads.push_back(ReadReference(skull, landmarks, a.threads));
   }
-  if (heads.empty()) {
-    heads.push_back(PhantomReference(1));
-    heads.push_back(PhantomReference(2));
-    Tell(stderr,
-         "note: without --reference the references are phantoms, which have no orbits, arches or "
-         "teeth; a real skull with landmarks as --reference gives a much better proposal\n");
-  }
   return heads;
+}
+
+Proposal MakeProposal(const ProposeArguments& a, const TriMesh& skull, const LandmarkFile& known,
+                      const RunContext& context) {
+  std::vector<SitePoint> points = known.Points();
+  std::erase_if(points, [](const SitePoint& p) { return !IsStandardSite(p.site); });
+  return a.references.empty()
+             ? ProposeLandmarks(skull, a.skull, ReadMeanSkull(), context, points)
+             : ProposeLandmarks(skull, a.skull, ReadReferences(a), context, points);
+}
+
+// The given landmarks first, as they are, then the proposed ones. A file that holds both is marked
+// as proposed; doubt_mm shows which ones are.
+LandmarkFile WithKnown(LandmarkFile known, const Proposal& proposal, const std::string& subject) {
+  LandmarkFile file = ProposalFile(proposal, subject);
+  for (Landmark& landmark : known.landmarks) {
+    if (file.axes == "RAS") {
+      landmark.MoveTo(ToLps(landmark.Position(), Axes::kRas));
+    }
+  }
+  std::erase_if(file.absent,
+                [&](const AbsentLandmark& a) { return known.Find(a.site) != nullptr; });
+  file.landmarks.insert(file.landmarks.begin(), known.landmarks.begin(), known.landmarks.end());
+  return file;
 }
 
 void PrintDifferences(const ProposeArguments& a, const LandmarkFile& file) {
@@ -139,7 +156,7 @@ void WriteProposal(const ProposeArguments& a, const std::string& out, const Land
 }
 
 std::vector<fs::path> InputsOfProposal(const ProposeArguments& a) {
-  std::vector<fs::path> given = {a.skull, a.compare};
+  std::vector<fs::path> given = {a.skull, a.landmarks, a.compare};
   for (const auto& [skull, landmarks] : a.references) {
     given.insert(given.end(), {skull, landmarks});
   }
@@ -162,10 +179,11 @@ int Propose(const ProposeArguments& a) {
   std::vector<std::string> notes;
   TriMesh skull = ReadMeshInLps(a.skull, notes);
   std::ranges::move(JoinCopies(skull, a.skull), std::back_inserter(notes));
-  const Proposal proposal = ProposeLandmarks(skull, a.skull, ReadReferences(a), context);
+  const LandmarkFile known = a.landmarks.empty() ? LandmarkFile() : ReadLandmarks(a.landmarks).file;
+  const Proposal proposal = MakeProposal(a, skull, known, context);
   PrintEach(notes, "note");
   PrintEach(proposal.notes, "note");
-  const LandmarkFile file = ProposalFile(proposal, fs::path(a.skull).stem().string());
+  const LandmarkFile file = WithKnown(known, proposal, fs::path(a.skull).stem().string());
   if (!a.compare.empty()) {
     PrintDifferences(a, file);
   }
@@ -182,7 +200,11 @@ void DeclarePropose(CLI::App& propose, CommandLine& line) {
   propose.add_option(
       "--reference", a.references,
       "SKULL LANDMARKS: a skull with known landmarks, mm; may be repeated, and the median "
-      "is used [two phantoms]");
+      "is used [the mean skull of 54 heads]");
+  propose.add_option("--landmarks", a.landmarks,
+                     "points of this skull that a person has placed; they stay, and the others are "
+                     "proposed from them. Three that are apart (n, zy_l, zy_r) replace the search "
+                     "for the pose");
   propose.add_option("--out", a.out, "file for the proposal [out/SKULL_proposed.yaml]");
   propose.add_option(
       "--compare", a.compare,

@@ -18,20 +18,46 @@ namespace semblance::problems {
 namespace {
 
 struct AverageLandmark {
-  std::string_view code;  // Site::landmark
-  double x, y, z;         // mm; the left one of a pair
+  std::string_view code;       // Site::landmark
+  double x, y, z;              // mm; the left one of a pair
+  double out_x, out_y, out_z;  // outward direction of the bone, about unit
 };
 
+// The directions are the mean over the 54 heads of configs/mean_skull/README.md, made symmetric.
 constexpr AverageLandmark kAverageSkull[] = {
-    {"sg", 0, 3, 27},     {"g", 0, -2, 13},    {"n", 0, 0, 0},       {"rhi", 0, -11, -14},
-    {"mp", 0, 0, -62},    {"pr", 0, -1, -67},  {"id", 0, 4, -91},    {"sm", 0, 10, -102},
-    {"pg", 0, 10, -112},  {"me", 0, 19, -121}, {"fe", 31, 20, 44},   {"mso", 29, 6, 11},
-    {"mio", 35, 12, -29}, {"im", 41, 20, -41}, {"lo", 46, 21, -36},  {"zy", 63, 57, -29},
-    {"sgl", 60, 81, -27}, {"go", 48, 71, -89}, {"sM2", 29, 35, -61}, {"mr", 45, 61, -71},
-    {"iM2", 34, 38, -89},
+    {"sg", 0, 3, 27, 0, -0.92, 0.39},
+    {"g", 0, -2, 13, 0, -1, 0.03},
+    {"n", 0, 0, 0, 0, -1, 0.03},
+    {"rhi", 0, -11, -14, 0, -0.75, 0.66},
+    {"mp", 0, 0, -62, 0, -0.95, 0.32},
+    {"pr", 0, -1, -67, 0, -0.96, 0.27},
+    {"id", 0, 4, -91, 0, -0.88, -0.47},
+    {"sm", 0, 10, -102, 0, -0.99, -0.14},
+    {"pg", 0, 10, -112, 0, -1, -0.04},
+    {"me", 0, 19, -121, 0, -0.52, -0.85},
+    {"fe", 31, 20, 44, 0.45, -0.71, 0.53},
+    {"mso", 29, 6, 11, 0.31, -0.88, -0.36},
+    {"mio", 35, 12, -29, 0.25, -0.91, -0.33},
+    {"im", 41, 20, -41, 0.35, -0.85, -0.4},
+    {"lo", 46, 21, -36, 0.52, -0.75, -0.42},
+    {"zy", 63, 57, -29, 1, 0.01, -0.05},
+    {"sgl", 60, 81, -27, 0.98, -0.15, 0.16},
+    {"go", 48, 71, -89, 0.98, -0.19, -0.12},
+    {"sM2", 29, 35, -61, 0.97, -0.24, -0.04},
+    {"mr", 45, 61, -71, 0.91, -0.4, -0.07},
+    {"iM2", 34, 38, -89, 0.69, -0.67, 0.28},
 };
 
 Vec3 Mirrored(const Vec3& p) { return {-p.x(), p.y(), p.z()}; }
+
+const AverageLandmark& FindAverageLandmark(std::string_view site) {
+  const std::string landmark = WithoutSide(site);
+  const auto* const found = std::ranges::find(kAverageSkull, landmark, &AverageLandmark::code);
+  if (found == std::end(kAverageSkull)) {
+    throw InputError(fmt::format("average skull: {}", problems::StandardSiteFault(site)));
+  }
+  return *found;
+}
 
 // The points of the same sites on the average skull and on the subject.
 struct SitePairs {
@@ -133,13 +159,15 @@ Similarity RefineByReweighting(const SitePairs& pairs, Similarity pose) {
 }  // namespace
 
 Vec3 AverageSite(std::string_view site) {
-  const std::string landmark = WithoutSide(site);
-  const auto* const found = std::ranges::find(kAverageSkull, landmark, &AverageLandmark::code);
-  if (found == std::end(kAverageSkull)) {
-    throw InputError(fmt::format("average skull: {}", StandardSiteFault(site)));
-  }
-  const bool right = SideOfSite(site) == Side::kRight;
-  return {right ? -found->x : found->x, found->y, found->z};
+  const AverageLandmark& found = FindAverageLandmark(site);
+  const Vec3 left(found.x, found.y, found.z);
+  return SideOfSite(site) == Side::kRight ? Mirrored(left) : left;
+}
+
+Vec3 AverageDirection(std::string_view site) {
+  const AverageLandmark& found = FindAverageLandmark(site);
+  const Vec3 left = Vec3(found.out_x, found.out_y, found.out_z).normalized();
+  return SideOfSite(site) == Side::kRight ? Mirrored(left) : left;
 }
 
 Vec3 SkullFit::Predicted(std::string_view site) const {

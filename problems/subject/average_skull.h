@@ -21,6 +21,9 @@ namespace semblance::problems {
 // lies within 8 mm of the mean of the other two. Throws InputError for a site that is not standard.
 Vec3 AverageSite(std::string_view site);
 
+// The unit direction out of the bone at that site. Throws as AverageSite.
+Vec3 AverageDirection(std::string_view site);
+
 struct SkullFit {
   Similarity skull_from_average;  // if `mirrored`, from the average skull's mirror image, x -> -x
   bool mirrored = false;

@@ -54,6 +54,7 @@ struct Landmark {
   std::optional<double> depth_along_normal_mm;
   std::optional<double> depth_closest_mm;
   Certainty certainty = Certainty::kMedium;
+  std::optional<double> doubt_mm;  // expected error of a proposed point; a person's has none
   std::string note;
 
   Vec3 Position() const { return {point[0], point[1], point[2]}; }
@@ -105,6 +106,13 @@ void Fields(Visitor& visit, Landmark& o) {
                   .doc = "measured distance to the closest skin"},
         o.depth_closest_mm);
   visit(FieldInfo{.name = "certainty", .doc = "how certain the position is"}, o.certainty);
+  visit(FieldInfo{.name = "doubt_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 1000,
+                  .doc = "expected error of a point that the program proposed; review the largest "
+                         "first"},
+        o.doubt_mm);
   visit(FieldInfo{.name = "note", .doc = "the observer's remarks"}, o.note);
 }
 

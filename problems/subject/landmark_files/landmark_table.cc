@@ -217,6 +217,7 @@ Landmark ReadRow(const CsvReader& table, const TableLayout& layout) {
           .depth_along_normal_mm = NumberAt(table, layout.depth_along_normal),
           .depth_closest_mm = NumberAt(table, layout.depth_closest),
           .certainty = CertaintyAt(table, layout.certainty),
+          .doubt_mm = std::nullopt,
           .note = layout.note ? std::string(table.Cell(*layout.note)) : ""};
 }
 

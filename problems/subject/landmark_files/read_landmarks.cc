@@ -282,7 +282,7 @@ std::vector<std::string> LostContents(const LandmarkFile& file, const fs::path& 
     lost.push_back(fmt::format("{} sites that are listed as absent", file.absent.size()));
   }
   if (format.parse != nullptr && file.proposed) {
-    lost.emplace_back("the mark that they are a proposal");
+    lost.emplace_back("the mark that they are a proposal, with their expected errors");
   }
   if (WrittenAxes(file, path) != file.axes) {
     lost.push_back(fmt::format(

@@ -11,6 +11,7 @@
 
 #include "problems/subject/propose/site_rules.h"
 #include "problems/subject/propose/skull_warp.h"
+#include "problems/subject/propose/suggestion_check.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
@@ -59,21 +60,43 @@ double ChanceWithin3mm(double rms_mm) {
 
 class Proposer {
  public:
-  Proposer(const TriMesh& skull, const std::string& name, std::span<const ReferenceHead> references,
+  Proposer(const TriMesh& skull, const std::string& name, std::span<const SitePoint> known,
            const RunContext& context)
       : name_(name),
-        references_(references),
+        known_(known),
         context_(context),
         bone_(skull),
+        skull_(skull),
+        ends_(skull),
         shell_(MakeShell(skull, name, context.threads)) {}
 
-  Proposal Run() {
+  Proposal RunWith(std::span<const ReferenceHead> references) {
+    references_ = references;
     ChoosePose();
     context_.Report("warp");
     CarryAll();
+    return PlaceAll();
+  }
+
+  Proposal RunWith(const MeanSkull& mean) {
+    references_ = {&mean.head, 1};
+    ChoosePose();
+    context_.Report("warp");
+    const AdaptedSkull adapted =
+        AdaptMeanSkull(mean, shell_, proposal_.pose.skull_from_reference, known_);
+    references_ = {&adapted.head, 1};
+    proposal_.pose.skull_from_reference = adapted.skull_from_head;
+    const ThinPlate plate = WarpOnto(adapted.head, shell_, adapted.skull_from_head, known_);
+    AddPredictions(adapted.head, CarrySites(adapted.head, shell_, adapted.skull_from_head, plate));
+    return PlaceAll();
+  }
+
+ private:
+  Proposal PlaceAll() {
     const Mat3 rotation = FitSites(MedianSites()).skull_from_average.rotation;
     for (const Site& site : StandardSites()) {
-      if (const auto found = predictions_.find(site.code); found != predictions_.end()) {
+      const auto found = predictions_.find(site.code);
+      if (found != predictions_.end() && !IsKnown(site.code)) {
         PlaceSite(site.code, found->second, rotation);
       }
     }
@@ -82,13 +105,20 @@ class Proposer {
     return std::move(proposal_);
   }
 
- private:
+  bool IsKnown(const std::string& site) const {
+    return std::ranges::find(known_, site, &SitePoint::site) != known_.end();
+  }
+
   [[noreturn]] void Fail(const std::string& what) const {
     throw InputError(fmt::format("{}: {}", name_, what));
   }
 
   void ChoosePose() {
     context_.Report("pose");
+    if (known_.size() >= 3) {
+      proposal_.pose.skull_from_reference = PoseFromKnown();
+      return;
+    }
     for (const ReferenceHead& head : references_) {
       const SkullPose pose = FindPose(head.shell, shell_, context_.threads);
       context_.ThrowIfStopped();
@@ -101,6 +131,21 @@ class Proposer {
     Fail(PoseFault(proposal_.pose));
   }
 
+  // The average skull's frame is also that of the references, except for their size.
+  Similarity PoseFromKnown() const {
+    constexpr double kMaxMisfit_mm = 8;  // of two different skulls, 4; of two that are apart, 15
+    const ReferenceHead& head = references_.front();
+    const Similarity pose = FacePose(head, shell_, FitAverageSkull(known_).skull_from_average);
+    const double misfit_mm = PoseMisfit_mm(head.shell, shell_, pose);
+    if (!(misfit_mm < kMaxMisfit_mm)) {
+      Fail(
+          fmt::format("a skull that lies as the {} given landmarks say is off by {:.0f} mm (mean "
+                      "distance); check these landmarks and their sides, then propose again",
+                      known_.size(), misfit_mm));
+    }
+    return pose;
+  }
+
   // Carries the sites of each reference twice: as it is, and mirrored.
   void CarryAll() {
     std::vector<std::vector<WarpedSite>> carried(2 * references_.size());
@@ -109,20 +154,26 @@ class Proposer {
       carried[k] = k % 2 == 0 ? Carry(head) : Carry(Mirrored(head));
     });
     for (std::size_t k = 0; k < carried.size(); ++k) {
+      AddPredictions(references_[k / 2], carried[k]);
       for (const WarpedSite& s : carried[k]) {
-        PredictionsPerReference& predictions = predictions_[s.site];
-        predictions.points.push_back(s.point);
-        predictions.piece_misfits_mm.push_back(s.piece_misfit_mm);
-        predictions.references += k % 2 == 0;
-        predictions.site_error_mm =
-            std::fmin(predictions.site_error_mm, references_[k / 2].site_error_mm);
+        predictions_[s.site].references -= k % 2 == 1;  // the mirror image is no second reference
       }
+    }
+  }
+
+  void AddPredictions(const ReferenceHead& head, const std::vector<WarpedSite>& carried) {
+    for (const WarpedSite& s : carried) {
+      PredictionsPerReference& predictions = predictions_[s.site];
+      predictions.points.push_back(s.point);
+      predictions.piece_misfits_mm.push_back(s.piece_misfit_mm);
+      ++predictions.references;
+      predictions.site_error_mm = std::fmin(predictions.site_error_mm, head.SiteError_mm(s.site));
     }
   }
 
   std::vector<WarpedSite> Carry(const ReferenceHead& head) const {
     const Similarity pose = FacePose(head, shell_, proposal_.pose.skull_from_reference);
-    return CarrySites(head, shell_, pose, WarpOnto(head, shell_, pose));
+    return CarrySites(head, shell_, pose, WarpOnto(head, shell_, pose, known_));
   }
 
   std::vector<SitePoint> MedianSites() const {
@@ -133,9 +184,10 @@ class Proposer {
     return sites;
   }
 
-  SkullFit FitSites(const std::vector<SitePoint>& sites,
-                    Handedness hand = Handedness::kAsIs) const {
+  SkullFit FitSites(std::vector<SitePoint> sites, Handedness hand = Handedness::kAsIs) const {
     constexpr std::size_t kMinSites = 6;  // as FindLandmarkMistakes
+    std::erase_if(sites, [&](const SitePoint& s) { return IsKnown(s.site); });
+    sites.insert(sites.end(), known_.begin(), known_.end());
     if (sites.size() < kMinSites) {
       Fail(
           fmt::format("only {} sites are found, and {} are needed to tell left from right; add a "
@@ -158,10 +210,18 @@ class Proposer {
                        kNoBone_mm, snapped.from_bone_mm)});
       return;
     }
+    const Vec3 point = bone_.Closest(snapped.point).position;
+    if (const std::string fault =
+            SuggestionFault(point, rotation * AverageDirection(site), {skull_, bone_, ends_});
+        !fault.empty()) {
+      proposal_.absent.push_back({site, fault});
+      return;
+    }
     ProposedSite found{.site = site,
-                       .point = bone_.Closest(snapped.point).position,
+                       .point = point,
                        .predicted = predicted,
                        .references = predictions.references,
+                       .predictions = static_cast<int>(predictions.points.size()),
                        .agreement_mm = Spread_mm(predictions.points, predicted),
                        .piece_misfit_mm = Median(predictions.piece_misfits_mm),
                        .from_bone_mm = snapped.from_bone_mm,
@@ -228,9 +288,12 @@ class Proposer {
   }
 
   const std::string& name_;
+  std::span<const SitePoint> known_;
   std::span<const ReferenceHead> references_;
   const RunContext& context_;
   MeshQuery bone_;
+  const TriMesh& skull_;
+  SurfaceEnds ends_;
   SkullShell shell_;
   std::map<std::string, PredictionsPerReference> predictions_;  // by site
   Proposal proposal_;
@@ -243,15 +306,18 @@ Certainty GradeCertainty(const ProposedSite& site) {
                                       : Certainty::kLow;
 }
 
+std::string DescribeSources(const ProposedSite& site) {
+  const std::string agree = fmt::format("agree within {:.1f} mm", site.agreement_mm);
+  return site.predictions == 1  ? "by the mean skull"
+         : site.references == 1 ? "1 reference and its mirror image " + agree
+                                : fmt::format("{} references {}", site.references, agree);
+}
+
 std::string ExplainConfidence(const ProposedSite& site) {
   return fmt::format(
-      "proposed, {:.0f} % likely within 3 mm: {} agree within {:.1f} mm, bone around it fits "
-      "within "
-      "{}; rule ({}) moved it by {:.1f} mm and is sharp to {:.1f} mm",
-      100 * site.confidence,
-      site.references == 1 ? "1 reference and its mirror image"
-                           : fmt::format("{} references", site.references),
-      site.agreement_mm,
+      "proposed, {:.0f} % likely within 3 mm: {}, bone around it fits within {}; rule ({}) moved "
+      "it by {:.1f} mm and is sharp to {:.1f} mm",
+      100 * site.confidence, DescribeSources(site),
       std::isfinite(site.piece_misfit_mm) ? fmt::format("{:.1f} mm", site.piece_misfit_mm)
                                           : "an unknown distance (too little bone is there)",
       FindSiteRule(site.site).what, (site.point - site.predicted).norm(), site.sharpness_mm);
@@ -274,12 +340,21 @@ SiteDifference CompareSite(const std::string& site, const Landmark* proposed,
 }  // namespace
 
 Proposal ProposeLandmarks(const TriMesh& skull, const std::string& name,
-                          std::span<const ReferenceHead> references, const RunContext& context) {
+                          std::span<const ReferenceHead> references, const RunContext& context,
+                          std::span<const SitePoint> known) {
   if (references.empty()) {
     throw InputError("landmarks cannot be proposed without a reference; give at least one");
   }
   std::vector<std::string> notes = CheckHeadMesh(skull, name);
-  Proposal proposal = Proposer(skull, name, references, context).Run();
+  Proposal proposal = Proposer(skull, name, known, context).RunWith(references);
+  proposal.notes.insert(proposal.notes.begin(), notes.begin(), notes.end());
+  return proposal;
+}
+
+Proposal ProposeLandmarks(const TriMesh& skull, const std::string& name, const MeanSkull& mean,
+                          const RunContext& context, std::span<const SitePoint> known) {
+  std::vector<std::string> notes = CheckHeadMesh(skull, name);
+  Proposal proposal = Proposer(skull, name, known, context).RunWith(mean);
   proposal.notes.insert(proposal.notes.begin(), notes.begin(), notes.end());
   return proposal;
 }
@@ -295,6 +370,7 @@ LandmarkFile ProposalFile(const Proposal& proposal, const std::string& subject) 
     landmark.site = site.site;
     landmark.MoveTo(site.point);
     landmark.certainty = GradeCertainty(site);
+    landmark.doubt_mm = site.expected_error_mm;
     landmark.note = ExplainConfidence(site);
     file.landmarks.push_back(landmark);
   }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "problems/subject/landmarks.h"
+#include "problems/subject/propose/mean_skull.h"
 #include "problems/subject/propose/reference_head.h"
 #include "problems/subject/propose/skull_pose.h"
 #include "surfaces/base/run_context.h"
@@ -20,6 +21,7 @@ struct ProposedSite {
   Vec3 point = Vec3::Constant(kNaN);      // on the skull, mm
   Vec3 predicted = Vec3::Constant(kNaN);  // median of the references, before the rule is applied
   int references = 0;                     // heads that have the site, without mirror images
+  int predictions = 0;                    // the same with mirror images
   double agreement_mm = kNaN;  // rms distance of the references' predictions from their median
   double piece_misfit_mm =
       kNaN;                    // of the bone around the site after the warp; median of references
@@ -36,9 +38,10 @@ struct ProposedSite {
 struct Proposal {
   std::vector<ProposedSite> sites;     // in the order of StandardSites()
   std::vector<AbsentLandmark> absent;  // sites without bone within 8 mm of the predicted point
-  SkullPose pose;                      // against the first reference that gives a clear pose
-  Similarity skull_from_average;       // fitted to the proposed sites
-  std::string axes = "LPS";            // of the skull's file, concluded from the pose: LPS or RAS
+  SkullPose pose;  // without misfits if known points determine it; against the first reference that
+                   // gives a clear pose
+  Similarity skull_from_average;  // fitted to the proposed sites
+  std::string axes = "LPS";       // of the skull's file, concluded from the pose: LPS or RAS
   std::vector<std::string> notes;
 };
 
@@ -46,11 +49,23 @@ struct Proposal {
 // (skull_pose.h), warps each reference and its mirror image onto the skull (skull_warp.h), takes
 // the median of their predictions, and snaps it to bone by the site's rule (site_rules.h). `skull`
 // is in mm and in any pose. `name` is for messages. The result does not depend on context.threads.
+//
+// `known` are sites that a person has placed. Three of them give the pose, so that no search is
+// needed, and the warps meet them. They are not proposed again.
+//
+// Points that are no good for a face are not proposed (suggestion_check.h); their sites are absent.
+//
 // Throws InputError if there is no reference, if the mesh is not a head's (mesh_check.h), if it
-// holds two skulls, if its shape does not determine its pose, if fewer than six sites are found, or
-// if the sides came out exchanged.
+// holds two skulls, if its shape does not determine its pose or the known sites do not fit it, if
+// fewer than six sites are found, or if the sides came out exchanged.
 Proposal ProposeLandmarks(const TriMesh& skull, const std::string& name,
-                          std::span<const ReferenceHead> references, const RunContext& context);
+                          std::span<const ReferenceHead> references, const RunContext& context,
+                          std::span<const SitePoint> known = {});
+
+// The same with the mean skull as the only reference, which its modes shape like the subject before
+// the warp.
+Proposal ProposeLandmarks(const TriMesh& skull, const std::string& name, const MeanSkull& mean,
+                          const RunContext& context, std::span<const SitePoint> known = {});
 
 // The proposal as a landmark file in the frame of the skull's file. `proposed` is set; each
 // landmark has a certainty and a note that explains it.

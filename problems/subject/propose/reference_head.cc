@@ -200,7 +200,8 @@ ReferenceHead Mirrored(const ReferenceHead& head) {
   return {.name = head.name + ", mirrored",
           .shell = AsShell(std::move(mesh)),
           .sites = std::move(sites),
-          .site_error_mm = head.site_error_mm};
+          .site_error_mm = head.site_error_mm,
+          .error_of_site_mm = head.error_of_site_mm};
 }
 
 }  // namespace semblance::problems

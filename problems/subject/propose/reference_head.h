@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <span>
 #include <string>
 #include <vector>
@@ -43,6 +44,12 @@ struct ReferenceHead {
   std::vector<SitePoint> sites;  // in the shell's frame
   double site_error_mm = kNaN;   // expected rms difference between a person's sites and those of a
                                  // perfect warp of this head
+  std::map<std::string, double> error_of_site_mm = {};  // replaces site_error_mm where it is known
+
+  double SiteError_mm(const std::string& site) const {
+    const auto found = error_of_site_mm.find(site);
+    return found != error_of_site_mm.end() ? found->second : site_error_mm;
+  }
 };
 
 // Throws InputError as MakeShell and FitAverageSkull do.

@@ -156,18 +156,32 @@ Frame PrincipalFrame(const std::vector<ShellPoint>& points) {
   return frame;
 }
 
+// Lays the middles on each other, at three heights: skulls may lack a mandible or a vault.
+void AddStarts(const Mat3& rotation, const Vec3& reference_middle, const Vec3& skull_middle,
+               std::vector<Similarity>& starts) {
+  for (const double up_mm : {0.0, 35.0, -35.0}) {
+    const Vec3 middle = reference_middle + Vec3(0, 0, up_mm);
+    starts.push_back(
+        {.scale = 1, .rotation = rotation, .translation = skull_middle - rotation * middle});
+  }
+}
+
 std::vector<Similarity> Starts(const ShellPair& pair) {
   const Frame reference = PrincipalFrame(pair.of_reference), skull = PrincipalFrame(pair.of_skull);
   std::vector<Similarity> starts;
   for (const Mat3& turn : CubeRotations()) {
     for (const Mat3& rotation : {Mat3(skull.axes * turn * reference.axes.transpose()), turn}) {
-      for (const double up_mm : {0.0, 35.0, -35.0}) {
-        const Vec3 middle = reference.middle + Vec3(0, 0, up_mm);
-        starts.push_back(
-            {.scale = 1, .rotation = rotation, .translation = skull.middle - rotation * middle});
-      }
+      AddStarts(rotation, reference.middle, skull.middle, starts);
     }
   }
+  return starts;
+}
+
+std::vector<Similarity> UprightStarts(const ShellPair& pair) {
+  const Frame reference = PrincipalFrame(pair.of_reference), skull = PrincipalFrame(pair.of_skull);
+  std::vector<Similarity> starts;
+  AddStarts(Mat3::Identity(), reference.middle, skull.middle, starts);
+  AddStarts(Vec3(-1, -1, 1).asDiagonal(), reference.middle, skull.middle, starts);
   return starts;
 }
 
@@ -193,6 +207,14 @@ double RivalMisfit_mm(const std::vector<Candidate>& candidates) {
     }
   }
   return std::numeric_limits<double>::infinity();
+}
+
+// True if the best upright pose needs no search for a better one. Two different adult skulls fit
+// each other within 2 to 4 mm; the opposite orientation of the same two is off by twice as much.
+bool IsPlain(const std::vector<Candidate>& upright) {
+  constexpr double kMaxMisfit_mm = 4, kMaxRivalRatio = 0.7;
+  return upright.front().misfit_mm < kMaxMisfit_mm &&
+         upright.front().misfit_mm < kMaxRivalRatio * RivalMisfit_mm(upright);
 }
 
 }  // namespace
@@ -255,13 +277,22 @@ SkullPose FindPose(const SkullShell& reference, const SkullShell& skull, int thr
   const auto refine = [&](const Stage& stage, const std::vector<Similarity>& poses) {
     return RefineAll(ShellPair(from, to, stage.cell_mm), poses, stage.rounds, threads);
   };
-  const std::vector<Candidate> all = refine(kFirst, Starts(ShellPair(from, to, kFirst.cell_mm)));
-  const std::vector<Candidate> some = refine(kMiddle, FirstPoses(all, kMiddle.poses));
+  const ShellPair coarse(from, to, kFirst.cell_mm);
+  std::vector<Candidate> some = refine(kMiddle, UprightStarts(coarse));
+  if (!IsPlain(some)) {
+    some = refine(kMiddle, FirstPoses(refine(kFirst, Starts(coarse)), kMiddle.poses));
+  }
   constexpr int kRoundsToRest = 40;
   const ShellPair fine(from, to, kLast.cell_mm);
   return {.skull_from_reference = Refine(fine, some.front().pose, kRoundsToRest).pose,
           .misfit_mm = some.front().misfit_mm,
           .rival_misfit_mm = RivalMisfit_mm(some)};
+}
+
+double PoseMisfit_mm(const SkullShell& reference, const SkullShell& skull,
+                     const Similarity& skull_from_reference) {
+  return Misfit_mm(
+      MatchBothWays(ShellPair(reference, skull, kMiddle.cell_mm), skull_from_reference));
 }
 
 Similarity RefinePose(const SkullShell& reference, const SkullShell& skull,
@@ -275,21 +306,24 @@ Similarity RefinePose(const SkullShell& reference, const SkullShell& skull,
 }
 
 std::string PoseFault(const SkullPose& pose) {
+  // The next step, which works in the program's commands and in the workbench alike.
+  constexpr const char* kPlaceThree =
+      "place nasion (n) and both zygia (zy_l, zy_r) by hand and propose again from these "
+      "(--landmarks FILE; in the workbench: click the three, then suggest the others)";
   constexpr double kMaxMisfit_mm = 6;      // more is no skull
   constexpr double kMaxRivalRatio = 0.85;  // best over rival misfit; nearer to 1 is undecided
   if (!(pose.misfit_mm < kMaxMisfit_mm)) {
     return fmt::format(
         "no pose brings it within {} mm of a skull (mean distance, best {:.1f} mm); check that the "
-        "file holds a skull, its unit, and that nothing else is in it",
-        kMaxMisfit_mm, pose.misfit_mm);
+        "file holds a skull, its unit, and that nothing else is in it; if it does, {}",
+        kMaxMisfit_mm, pose.misfit_mm, kPlaceThree);
   }
   if (pose.misfit_mm > kMaxRivalRatio * pose.rival_misfit_mm) {
     return fmt::format(
         "its shape does not determine its pose: the best pose is off by {:.1f} mm and one turned "
         "by "
-        "more than 45 degrees by {:.1f} mm; check that the file holds a skull, or add one like it "
-        "as --reference",
-        pose.misfit_mm, pose.rival_misfit_mm);
+        "more than 45 degrees by {:.1f} mm; check that the file holds a skull; if it does, {}",
+        pose.misfit_mm, pose.rival_misfit_mm, kPlaceThree);
   }
   return "";
 }

@@ -39,7 +39,9 @@ struct SkullPose {
   double rival_misfit_mm = kNaN;
 };
 
-// Finds the pose by trimmed ICP in both directions with scale, from 144 starts. The rotations of
+// Finds the pose by trimmed ICP in both directions with scale. Most files lie upright, in LPS or
+// RAS, so these two are tried first; if one of them fits well and much better than the other, it is
+// the pose. Otherwise the search begins from 144 starts. The rotations of
 // the starts are the 24 that lay principal axes on principal axes and the 24 that lay the axes of
 // the files on each other; all are proper, so that sides are never exchanged. Each is shifted along
 // z by 0, 35 and -35 mm, for skulls without a mandible or a vault. All starts are refined on few
@@ -52,6 +54,10 @@ SkullPose FindPose(const SkullShell& reference, const SkullShell& skull, int thr
 Similarity RefinePose(const SkullShell& reference, const SkullShell& skull,
                       const Similarity& skull_from_reference,
                       const std::function<bool(const Vec3&)>& counts);
+
+// SkullPose::misfit_mm of any pose.
+double PoseMisfit_mm(const SkullShell& reference, const SkullShell& skull,
+                     const Similarity& skull_from_reference);
 
 // The fault of an unclear pose and its remedy; empty if the pose is clear.
 std::string PoseFault(const SkullPose& pose);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "problems/subject/propose/skull_pose.h"
 #include "surfaces/mesh/tri_mesh.h"
@@ -65,8 +66,15 @@ struct Round {
 
 class Warper {
  public:
-  Warper(const ReferenceHead& reference, const SkullShell& skull, const Similarity& pose)
+  Warper(const ReferenceHead& reference, const SkullShell& skull, const Similarity& pose,
+         std::span<const SitePoint> known)
       : reference_(reference), skull_(skull), pose_(pose) {
+    for (const SitePoint& s : known) {
+      const auto own = std::ranges::find(reference.sites, s.site, &SitePoint::site);
+      if (own != reference.sites.end()) {
+        known_.emplace_back(own->point, s.point);
+      }
+    }
     of_reference_ =
         SpreadDenser(reference.shell, [&](const Vec3& p) { return NearASite(reference, p); });
     const Similarity back = Inverse(pose);
@@ -94,6 +102,13 @@ class Warper {
   Pairs Match(double reach_mm) const {
     const CorrespondenceOptions match{.reach_mm = reach_mm, .least_cosine = kMinCosine};
     Pairs pairs;
+    for (const auto& [from, to] : known_) {
+      // A click stands for all bone around it, so it weighs as much as several matches.
+      constexpr double kClickWeight = 5;
+      pairs.from.push_back(from);
+      pairs.to.push_back(to);
+      pairs.weights.push_back(kClickWeight);
+    }
     for (const ShellPoint& p : of_reference_) {
       const Vec3 moved = plate_(p.position);
       if (const auto q = skull_.surface.Find(moved, pose_.rotation * p.normal, match)) {
@@ -120,6 +135,7 @@ class Warper {
   const SkullShell& skull_;
   const Similarity& pose_;
   std::vector<ShellPoint> of_reference_, of_skull_;
+  std::vector<std::pair<Vec3, Vec3>> known_;  // points of the reference and of the skull
   TriMesh coarse_;  // coarse shell of the reference, for matches from the skull
   ThinPlate plate_;
 };
@@ -189,8 +205,8 @@ Similarity FacePose(const ReferenceHead& reference, const SkullShell& skull,
 }
 
 ThinPlate WarpOnto(const ReferenceHead& reference, const SkullShell& skull,
-                   const Similarity& skull_from_reference) {
-  return Warper(reference, skull, skull_from_reference).Run();
+                   const Similarity& skull_from_reference, std::span<const SitePoint> known) {
+  return Warper(reference, skull, skull_from_reference, known).Run();
 }
 
 std::vector<WarpedSite> CarrySites(const ReferenceHead& reference, const SkullShell& skull,

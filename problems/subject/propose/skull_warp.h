@@ -2,6 +2,7 @@
 // Warps a reference's skull onto another skull, beyond size and pose, and carries its sites along.
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -19,9 +20,10 @@ Similarity FacePose(const ReferenceHead& reference, const SkullShell& skull,
 // In each round, points of both shells, denser within 30 mm of a site, are matched with the closest
 // points of the other that face alike. Matches beyond a reach are dropped; the others weigh less
 // the farther they are. The plate is nearly affine at first and becomes softer, while the reach
-// becomes shorter.
+// becomes shorter. `known`: sites of the skull that a person has placed. In every round, the
+// reference's sites are matched with them too.
 ThinPlate WarpOnto(const ReferenceHead& reference, const SkullShell& skull,
-                   const Similarity& skull_from_reference);
+                   const Similarity& skull_from_reference, std::span<const SitePoint> known = {});
 
 // A reference's site carried to the skull.
 struct WarpedSite {

@@ -58,6 +58,7 @@ LandmarkFile SampleFile() {
                               .depth_along_normal_mm = random.Uniform(1, 20),
                               .depth_closest_mm = random.Uniform(1, 20),
                               .certainty = Certainty::kLow,
+                              .doubt_mm = std::nullopt,
                               .note = "worn, see \"photo\" 3"});
   }
   return file;
