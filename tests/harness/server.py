@@ -18,7 +18,7 @@ ACTIONS = [
     {"do": "remark", "site": "g", "certainty": "low", "note": "x", "depth_mm": 5}, {"do": "set", "path": "tissue.set_mm.g", "value": 5},
     {"do": "set", "path": "interp", "value": "nearest"}, {"do": "unset", "path": "interp"}, {"do": "pull", "at": [0, -90, 0], "by": [0, -1, 0], "level": 1, "reach": 1.0, "mirror": False},
     {"do": "clear_edits"}, {"do": "keep_feature", "part": "nose", "name": "a"}, {"do": "blend_feature", "name": "a", "weight": 0.5}, {"do": "undo"}, {"do": "redo"},
-    {"do": "cancel"}, {"do": "take_predicted"}, {"do": "clear_landmarks"},
+    {"do": "cancel"}, {"do": "clear_landmarks"},
 ]
 PLACES = ["", "index.html", "main.js", "run/report.html", "run/../workbench.yaml", "run/%2e%2e/workbench.yaml", "run//etc/passwd", "run/\0", "../../etc/passwd", "api/state",
           "api/nosuch", "api/coarse?variant=%00", "api/coarse?variant=thinner", "api/coarse?path=interp&value=nearest", "api/coarse?path=interp&value=[", "api/coarse?path=%ff&value=1",

@@ -19,13 +19,24 @@ const nextOpen = (code) => {
   return [...codes.slice(at + 1), ...codes.slice(0, at + 1)].find((other) => !landmarkOf(other) && !isAbsent(other)) || null;
 };
 
+// The proposed points, the most doubtful first; one without a doubt comes before all.
+const toReview = () => store.state.landmarks.filter((landmark) => landmark.proposed)
+    .sort((a, b) => (b.doubt_mm ?? Infinity) - (a.doubt_mm ?? Infinity));
+
+// The first three clicks determine the pose; the program suggests the rest from them.
+const FIRST_CLICKS = ['n', 'zy_l', 'zy_r'];
+const nextStep = () => FIRST_CLICKS.find((code) => !landmarkOf(code) && !isAbsent(code)) || null;
+
 const doubts = (landmark) =>
     Object.keys(DOUBTFUL).filter((check) => landmark[check] !== null && landmark[check] > DOUBTFUL[check]);
+
+const doubtText = ({doubt_mm, doubtful}) =>
+    `${doubtful ? 'doubtful' : 'check it'}${doubt_mm === null ? '' : `: may be off by ${millimetres(doubt_mm)}`}`;
 
 function row(site) {
   const landmark = landmarkOf(site.site), absent = isAbsent(site.site);
   const mark = landmark ? (landmark.proposed ? '\u25cc' : '\u25cf') : absent ? '\u2013' : '\u25cb';
-  const words = landmark ? (landmark.proposed ? 'proposed: check it' : doubts(landmark).length ? 'check again' : '')
+  const words = landmark ? (landmark.proposed ? doubtText(landmark) : doubts(landmark).length ? 'check again' : '')
                          : absent ? 'absent' : '';
   const made = button('', () => choose(site.site), {className: 'site', dataset: {site: site.site}});
   made.setAttribute('aria-pressed', String(store.site === site.site));
@@ -70,6 +81,11 @@ const allSites = element('details', {ontoggle: () => {
   }
 }}, element('summary', {textContent: 'All sites by number'}));
 
+// Confirms a point and goes on to the next one to review.
+async function confirm(code) {
+  if (await act('confirm', {site: code}) && toReview().length) { choose(toReview()[0].site); }
+}
+
 function detail(code) {
   if (!code) {
     return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. Click on a ball to choose its site.'})];
@@ -82,9 +98,11 @@ function detail(code) {
   return [
     element('h2', {textContent: nameOf(code)}),
     element('div', {className: 'site-place'}, element('p', {textContent: `${site.definition}.`}), pictureOf(code)),
+    landmark && landmark.proposed ? element('p', {className: landmark.doubtful ? 'bad' : 'soft', textContent:
+        `The program proposed this point: ${doubtText(landmark)}. Move it by a click on the bone, or confirm it.`}) : null,
     checks.length ? element('ul', {className: 'checks'}, ...checks) : null,
     element('div', {className: 'row'},
-        landmark && landmark.proposed ? button('Confirm', () => act('confirm', {site: code}), {className: 'primary'}) : null,
+        landmark && landmark.proposed ? button('It is right', () => confirm(code), {className: 'primary', title: 'Enter'}) : null,
         landmark ? button('Remove', () => act('remove', {site: code})) : null,
         isAbsent(code) ? null : button('Mark absent', () => act('absent', {site: code, reason: 'the bone is missing'})),
         button('Next open site', () => choose(nextOpen(code)), {title: 'N'})),
@@ -94,6 +112,23 @@ function detail(code) {
     landmark ? remarks(landmark) : null,
     allSites
   ].filter((part) => part);
+}
+
+const confirmed = (state) => state.landmarks.filter(({site, proposed}) => !proposed && siteOf(site).standard).length;
+
+function suggestion(state) {
+  const placed = confirmed(state);
+  return placed >= 3 ? `Suggest the other ${standardSites().length - placed}` : 'Suggest all by shape';
+}
+
+// One sentence that names the next step.
+function guide(state, proposed, doubtful) {
+  const next = nextStep();
+  const text = proposed ? (doubtful ? `${doubtful} of the ${proposed} proposed points are doubtful: review them, the most doubtful first.`
+                                    : 'Look at the proposed points. If they are right, confirm all at once.')
+      : confirmed(state) < 3 && next ? `Click on the bone at ${nameOf(next)} (${next}). After ${FIRST_CLICKS.map(nameOf).join(', ')} the program suggests the rest.`
+      : confirmed(state) < standardSites().length ? 'Let the program suggest the other sites, or place them yourself.' : '';
+  return element('p', {className: 'hint', textContent: text});
 }
 
 export function landmarkPanel(bench) {
@@ -119,14 +154,17 @@ export function landmarkPanel(bench) {
 
   const draw = () => {
     const state = store.state, placed = state.landmarks.filter(({site}) => siteOf(site).standard);
-    const proposed = state.landmarks.filter((landmark) => landmark.proposed).length;
+    const proposed = toReview().length, doubtful = toReview().filter((landmark) => landmark.doubtful).length;
     head.replaceChildren(
         element('p', {textContent: `${placed.length} of ${standardSites().length} sites are placed${proposed ? `, ${proposed} of them proposed` : ''}.`}),
         element('div', {className: 'row'},
-            state.predicted.length ? button(`Suggest the other ${state.predicted.length}`, () => act('take_predicted'),
-                                           {title: 'predicted from the placed sites and an average skull'}) : null,
-            button('Propose by shape', () => act('propose'), {title: 'searches all sites on the bone; takes a minute'}),
-            proposed ? button('Confirm all', () => act('confirm_all')) : null),
+            button(suggestion(state), () => act('propose'), {className: proposed ? '' : 'primary',
+                   title: 'searches the other sites on the bone, from the points that you have placed'}),
+            proposed ? button(`Review ${proposed}`, () => choose(toReview()[0].site),
+                              {className: 'primary', title: 'the most doubtful first'}) : null,
+            proposed ? button('All are right', () => act('confirm_all'), {disabled: doubtful > 0,
+                              title: doubtful ? `first confirm or move the ${doubtful} doubtful ones` : ''}) : null),
+        guide(state, proposed, doubtful),
         lines(state.errors, 'bad') || '', lines(state.notes, 'soft') || '');
     about.replaceChildren(...detail(store.site));
     const further = store.sites.filter((site) => !site.standard);
@@ -144,8 +182,10 @@ export function landmarkPanel(bench) {
     }
     if (!skull || !store.site) { return; }
     const site = store.site, isNew = !landmarkOf(site);
+    const wasProposed = !isNew && landmarkOf(site).proposed;
     const done = await act('place', {site, origin: ray.origin.toArray(), direction: ray.direction.toArray(), near: skull.point.toArray()});
-    if (done && isNew) { choose(nextOpen(site)); }
+    if (done && isNew) { choose(nextStep() || nextOpen(site)); }
+    if (done && wasProposed && toReview().length) { choose(toReview()[0].site); }
   };
 
   onChoice((code) => {
@@ -157,7 +197,7 @@ export function landmarkPanel(bench) {
     if (!root.isConnected || ['INPUT', 'SELECT'].includes(event.target.tagName)) { return; }
     if (event.key.toLowerCase() === 'n' && !event.ctrlKey) { choose(nextOpen(store.site || '')); }
     if (event.key === 'Delete' && store.site && landmarkOf(store.site)) { act('remove', {site: store.site}); }
-    if (event.key === 'Enter' && event.target.tagName !== 'BUTTON' && store.site && landmarkOf(store.site)) { act('confirm', {site: store.site}); }
+    if (event.key === 'Enter' && event.target.tagName !== 'BUTTON' && store.site && landmarkOf(store.site)) { confirm(store.site); }
   });
   return {
     element: root,
@@ -167,7 +207,7 @@ export function landmarkPanel(bench) {
       scene.shared.layers.get('face').shown = false;
       scene.shared.layers.get('dowels').shown = false;
       scene.update();
-      if (store.state && !store.site) { store.site = nextOpen(''); }
+      if (store.state && !store.site) { store.site = nextStep() || nextOpen(''); }
     },
     hide: () => {
       scene.onPick = null;

@@ -183,9 +183,11 @@ void Bench::Commit(BenchHistory history, bool by_job) {
                  : subject_options == subject_options_
                      ? std::make_shared<const BenchSubject>(LoadOrExplain(files, Context()))
                      : std::make_shared<const BenchSubject>(LoadBenchSubject(files, Context()));
-  LandmarkChecks checks = subject->bone ? CheckLandmarks(ToLandmarkFile(state), subject->skull.mesh,
-                                                         *subject->bone, experiment.landmarks)
-                                        : LandmarkChecks();
+  LandmarkChecks checks =
+      subject->bone ? CheckLandmarks(ToLandmarkFile(state),
+                                     {subject->skull.mesh, *subject->bone, *subject->ends},
+                                     experiment.landmarks)
+                    : LandmarkChecks();
   std::string present_key = RunKey(keyed, state, contents);
   const bool has_changed_file = HasChangedFile(contents_, contents);
   std::shared_ptr<StageCache> stages =
@@ -341,17 +343,6 @@ void Bench::PlaceByRay(const std::string& site, const Vec3& origin, const Vec3& 
   const auto hit = subject_->bone->FirstHit(origin, direction, kFar_mm);
   const Vec3 point = hit ? hit->position : subject_->bone->Closest(near).position;
   Commit(AddStep(history_, "placed " + site, PlaceLandmark(CurrentState(history_), site, point)));
-}
-
-void Bench::AcceptPredicted() {
-  const Lock lock(mutex_);
-  if (checks_.predicted.empty()) {
-    throw InputError(
-        "landmarks: no site is predicted; place three or more that do not lie on a line, on a head "
-        "in mm and LPS");
-  }
-  Commit(AddStep(history_, "suggested the other landmarks",
-                 AddProposals(CurrentState(history_), PredictedLandmarks(checks_))));
 }
 
 const RunFace& Bench::FreshFace() const {
@@ -649,22 +640,20 @@ void Bench::StartRun() {
 
 std::string Bench::Propose(const RunContext& context) {
   std::shared_ptr<const BenchSubject> subject;
-  std::string name;
+  BenchState state;
   int revision = 0;
   {
     const Lock lock(mutex_);
     subject = subject_;
-    name = CurrentState(history_).subject;
+    state = CurrentState(history_);
     revision = revision_;
   }
-  std::vector<ReferenceHead> phantoms;
-  if (references_.empty()) {
-    phantoms.push_back(PhantomReference(1));
-    phantoms.push_back(PhantomReference(2));
-  }
-  const Proposal proposal = ProposeLandmarks(subject->skull.mesh, "the skull",
-                                             references_.empty() ? phantoms : references_, context);
-  LandmarkFile file = ProposalFile(proposal, name);
+  const std::vector<SitePoint> known = ConfirmedSites(state);
+  const Proposal proposal =
+      references_.empty()
+          ? ProposeLandmarks(subject->skull.mesh, "the skull", ReadMeanSkull(), context, known)
+          : ProposeLandmarks(subject->skull.mesh, "the skull", references_, context, known);
+  LandmarkFile file = ProposalFile(proposal, state.subject);
   file.axes = "LPS";  // the points lie on the mesh as it is shown here
   const Lock lock(mutex_);
   if (revision != revision_) {
@@ -672,13 +661,11 @@ std::string Bench::Propose(const RunContext& context) {
   }
   Commit(AddStep(history_, "proposed landmarks", AddProposals(CurrentState(history_), file)),
          /*by_job=*/true);
-  std::string words = fmt::format("{} sites proposed, {} absent; check each", file.landmarks.size(),
-                                  file.absent.size());
+  std::string words =
+      fmt::format("{} sites proposed, {} absent; review them, the most doubtful first",
+                  file.landmarks.size(), file.absent.size());
   if (proposal.axes == "RAS") {
     words += ". The skull seems to lie in RAS axes: if its file does, set its axes to RAS";
-  }
-  if (references_.empty()) {
-    words += ". The references were phantoms, which have no orbits, arches or teeth";
   }
   return words;
 }

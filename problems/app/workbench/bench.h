@@ -159,8 +159,6 @@ class Bench {
   // at the point of the bone nearest to `near`.
   void PlaceByRay(const std::string& site, const Vec3& origin, const Vec3& direction,
                   const Vec3& near);
-  // Places the predicted sites as proposals. Throws InputError if none is predicted.
-  void AcceptPredicted();
 
   // Pulls the full face at its point nearest to `at`. Throws InputError if the face is not fresh.
   void PullAt(const Vec3& at, Pull pull);

@@ -47,8 +47,23 @@ BenchLandmark ToBench(const Landmark& l, bool proposed) {
           .depth_along_normal_mm = l.depth_along_normal_mm,
           .depth_closest_mm = l.depth_closest_mm,
           .certainty = l.certainty,
+          .doubt_mm = l.doubt_mm,
           .note = l.note,
           .proposed = proposed};
+}
+
+// From here on the point is a person's.
+void TakeOver(BenchLandmark& landmark) {
+  landmark.proposed = false;
+  landmark.doubt_mm.reset();
+}
+
+// A file may hold a person's points beside proposed ones, which alone have a doubt then.
+bool IsProposed(const Landmark& landmark, const LandmarkFile& file) {
+  return file.proposed &&
+         (landmark.doubt_mm || std::ranges::none_of(file.landmarks, [](const Landmark& l) {
+            return l.doubt_mm.has_value();
+          }));
 }
 
 }  // namespace
@@ -63,7 +78,10 @@ BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& 
       at == state.landmarks.end() ? state.landmarks.emplace_back(BenchLandmark{.site = site}) : *at;
   landmark.point = {point.x(), point.y(), point.z()};
   landmark.normal.reset();
-  landmark.proposed = false;
+  if (landmark.proposed) {
+    TakeOver(landmark);
+    landmark.note.clear();  // it explained the proposed point
+  }
   DropAbsence(state, site);
   return state;
 }
@@ -111,14 +129,22 @@ BenchState RemarkLandmark(BenchState state, const std::string& site,
 }
 
 BenchState ConfirmLandmark(BenchState state, const std::string& site) {
-  RequirePlaced(state, site).proposed = false;
+  TakeOver(RequirePlaced(state, site));
   return state;
 }
 
 BenchState ConfirmAllLandmarks(BenchState state) {
-  for (BenchLandmark& landmark : state.landmarks) {
-    landmark.proposed = false;
+  std::string doubtful;
+  for (const BenchLandmark& landmark : state.landmarks) {
+    if (landmark.IsDoubtful()) {
+      doubtful += (doubtful.empty() ? "" : ", ") + landmark.site;
+    }
   }
+  if (!doubtful.empty()) {
+    throw InputError(fmt::format(
+        "landmarks: look at the doubtful ones first and confirm or move each: {}", doubtful));
+  }
+  std::ranges::for_each(state.landmarks, &TakeOver);
   return state;
 }
 
@@ -126,7 +152,7 @@ BenchState ReplaceLandmarks(BenchState state, const LandmarkFile& file) {
   state.landmarks.clear();
   state.absent.clear();
   for (const Landmark& landmark : file.landmarks) {
-    state.landmarks.push_back(ToBench(landmark, file.proposed));
+    state.landmarks.push_back(ToBench(landmark, IsProposed(landmark, file)));
   }
   for (const AbsentLandmark& absent : file.absent) {
     state.absent.push_back({absent.site, absent.reason});

@@ -15,7 +15,7 @@
 namespace semblance::problems {
 
 // Places the site or moves it. The site is then neither proposed nor absent. Its measurements and
-// its note stay. Its normal is dropped because the normal belonged to the former place.
+// a person's note stay. Its normal is dropped because the normal belonged to the former place.
 BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& point);
 
 BenchState RemoveLandmark(BenchState state, const std::string& site);
@@ -36,11 +36,13 @@ struct LandmarkRemarks {
 BenchState RemarkLandmark(BenchState state, const std::string& site,
                           const LandmarkRemarks& remarks);
 
-// Record that a person has checked one proposed landmark, or all of them.
+// Record that a person has checked one proposed landmark, or all of them. The latter throws as long
+// as there are doubtful ones (BenchLandmark::IsDoubtful), which are confirmed one by one.
 BenchState ConfirmLandmark(BenchState state, const std::string& site);
 BenchState ConfirmAllLandmarks(BenchState state);
 
-// Replaces all landmarks by those of a file. They count as proposed if the file is.
+// Replaces all landmarks by those of a file. If it is marked as proposed, those with a doubt count
+// as proposed, or all of them if none has a doubt.
 BenchState ReplaceLandmarks(BenchState state, const LandmarkFile& file);
 
 // Adds proposed points for the sites that a person has neither placed nor marked absent. Earlier

@@ -292,7 +292,6 @@ void ClearLandmarks(Bench& bench, const Json&) {
   bench.Apply("removed all landmarks",
               [](BenchState s) { return ReplaceLandmarks(std::move(s), {}); });
 }
-void Predicted(Bench& bench, const Json&) { bench.AcceptPredicted(); }
 void Set(Bench& bench, const Json& json) {
   const std::string path = ReadText(json, "path");
   if (path == "subject.axes" || path == "subject.units") {
@@ -357,7 +356,7 @@ void RunFace(Bench& bench, const Json&) { bench.StartRun(); }
 void ProposeSites(Bench& bench, const Json&) { bench.StartProposal(); }
 void Cancel(Bench& bench, const Json&) { bench.CancelJob(); }
 
-constexpr std::array<std::pair<std::string_view, Action>, 23> kActions = {
+constexpr std::array<std::pair<std::string_view, Action>, 22> kActions = {
     {{"place", &Place},
      {"remove", &Remove},
      {"rename", &Rename},
@@ -366,7 +365,6 @@ constexpr std::array<std::pair<std::string_view, Action>, 23> kActions = {
      {"confirm", &Confirm},
      {"confirm_all", &ConfirmAll},
      {"clear_landmarks", &ClearLandmarks},
-     {"take_predicted", &Predicted},
      {"set", &Set},
      {"unset", &Unset},
      {"open", &OpenFile},

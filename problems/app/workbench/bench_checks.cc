@@ -55,11 +55,8 @@ void MeasureMirrors(std::span<const SitePoint> sites, const MidPlane& plane,
   }
 }
 
-void Predict(const SkullFit& fit, std::span<const SitePoint> sites, const MeshQuery& bone,
+void Predict(const SkullFit& fit, std::span<const SitePoint> sites, const SuggestedBone& bone,
              LandmarkChecks& checks) {
-  // A larger limit would offer predictions beside missing bone, a smaller one would drop good ones
-  // on unusual skulls.
-  constexpr double kFarthest_mm = 15;
   for (std::size_t k = 0; k < sites.size(); ++k) {
     checks.sites[sites[k].site].from_predicted_mm = fit.residual_mm[k];
   }
@@ -67,20 +64,20 @@ void Predict(const SkullFit& fit, std::span<const SitePoint> sites, const MeshQu
     if (checks.sites.contains(site)) {
       continue;
     }
-    const MeshPoint at = bone.Closest(fit.Predicted(site));
-    if (at.distance_mm <= kFarthest_mm) {
-      checks.predicted[site] = at.position;
+    const Vec3 outward = fit.skull_from_average.rotation * AverageDirection(site);
+    if (const auto point = FindOuterPoint(fit.Predicted(site), outward, bone)) {
+      checks.predicted[site] = *point;
     }
   }
 }
 
 }  // namespace
 
-LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, const MeshQuery& bone,
+LandmarkChecks CheckLandmarks(const LandmarkFile& file, const SuggestedBone& bone,
                               const PlaceOptions& options) {
   LandmarkChecks checks;
   for (const Landmark& l : file.landmarks) {
-    checks.sites[l.site].from_bone_mm = bone.Closest(l.Position()).distance_mm;
+    checks.sites[l.site].from_bone_mm = bone.query.Closest(l.Position()).distance_mm;
   }
   const std::vector<SitePoint> sites = StandardSites(file);
   if (const auto fit = TryFitAverageSkull(sites)) {
@@ -90,25 +87,11 @@ LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, co
     MeasureMirrors(sites, *plane, checks);
   }
   if (!file.landmarks.empty()) {
-    InputMistakes found = FindLandmarkMistakes(file, skull, bone, options);
+    InputMistakes found = FindLandmarkMistakes(file, bone.mesh, bone.query, options);
     checks.errors = std::move(found.errors);
     checks.notes = std::move(found.notes);
   }
   return checks;
-}
-
-LandmarkFile PredictedLandmarks(const LandmarkChecks& checks) {
-  LandmarkFile file;
-  file.proposed = true;
-  for (const auto& [site, point] : checks.predicted) {
-    Landmark landmark;
-    landmark.site = site;
-    landmark.point = {point.x(), point.y(), point.z()};
-    landmark.certainty = Certainty::kLow;
-    landmark.note = "predicted from the other landmarks and an average skull";
-    file.landmarks.push_back(std::move(landmark));
-  }
-  return file;
 }
 
 }  // namespace semblance::problems

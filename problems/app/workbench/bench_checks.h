@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "problems/subject/dowel_placement.h"
-#include "surfaces/mesh/mesh_query.h"
+#include "problems/subject/propose/suggestion_check.h"
 
 namespace semblance::problems {
 
@@ -20,16 +20,14 @@ struct SiteCheck {
 
 struct LandmarkChecks {
   std::map<std::string, SiteCheck> sites;  // the placed sites
-  std::map<std::string, Vec3> predicted;   // standard sites that are not placed, on the bone
+  std::map<std::string, Vec3> predicted;   // standard sites not placed, on the bone
   std::vector<std::string> errors, notes;  // from FindLandmarkMistakes
 };
 
-// Three sites or more predict the others. One pair and a third site define the mid-plane. A
-// prediction more than 15 mm from any bone is left out.
-LandmarkChecks CheckLandmarks(const LandmarkFile& file, const TriMesh& skull, const MeshQuery& bone,
+// Three sites or more predict the others, one pair and a third site define the mid-plane. A
+// prediction is the outermost bone in its site's direction (FindOuterPoint); one without such bone
+// is left out. It only shows where to click: proposals follow the skull's shape.
+LandmarkChecks CheckLandmarks(const LandmarkFile& file, const SuggestedBone& bone,
                               const PlaceOptions& options);
-
-// The predicted points as proposed landmarks, which a person has to check.
-LandmarkFile PredictedLandmarks(const LandmarkChecks& checks);
 
 }  // namespace semblance::problems

@@ -22,6 +22,8 @@ Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
                {"certainty", EnumWord(l.certainty)},
                {"note", l.note},
                {"proposed", l.proposed}};
+  json["doubt_mm"] = l.doubt_mm ? Json(*l.doubt_mm) : Json();
+  json["doubtful"] = l.IsDoubtful();
   json["depth_along_normal_mm"] = l.depth_along_normal_mm ? Json(*l.depth_along_normal_mm) : Json();
   if (const auto at = checks.sites.find(l.site); at != checks.sites.end()) {
     json["from_bone_mm"] = at->second.from_bone_mm;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "problems/config/config.h"
+#include "problems/subject/sites.h"
 
 namespace semblance::problems {
 namespace {
@@ -131,6 +132,16 @@ WrittenStep ToWrittenStep(const BenchStep& step, const EditScript* before) {
 
 }  // namespace
 
+std::vector<SitePoint> ConfirmedSites(const BenchState& state) {
+  std::vector<SitePoint> sites;
+  for (const BenchLandmark& l : state.landmarks) {
+    if (!l.proposed && IsStandardSite(l.site)) {
+      sites.push_back({l.site, Vec3(l.point[0], l.point[1], l.point[2])});
+    }
+  }
+  return sites;
+}
+
 LandmarkFile ToLandmarkFile(const BenchState& state) {
   LandmarkFile file;
   file.subject = state.subject.empty() ? "subject" : state.subject;
@@ -141,6 +152,7 @@ LandmarkFile ToLandmarkFile(const BenchState& state) {
                               .depth_along_normal_mm = l.depth_along_normal_mm,
                               .depth_closest_mm = l.depth_closest_mm,
                               .certainty = l.certainty,
+                              .doubt_mm = l.doubt_mm,
                               .note = l.note});
     file.proposed = file.proposed || l.proposed;
   }

@@ -25,8 +25,17 @@ struct BenchLandmark {
   std::optional<double> depth_along_normal_mm = {};
   std::optional<double> depth_closest_mm = {};
   Certainty certainty = Certainty::kMedium;
+  std::optional<double> doubt_mm = {};  // expected error of a proposed point
   std::string note = {};
   bool proposed = false;  // by the program, and no person has confirmed it
+
+  // True if a person has to confirm this point by itself: 5 mm is twice the error of the other
+  // proposed points, and moves the face by about a millimetre. A point without a doubt is doubtful
+  // if its certainty is low.
+  bool IsDoubtful() const {
+    constexpr double kDoubtful_mm = 5;
+    return proposed && (doubt_mm ? *doubt_mm > kDoubtful_mm : certainty == Certainty::kLow);
+  }
 };
 
 struct BenchAbsent {
@@ -59,6 +68,12 @@ void Fields(Visitor& visit, BenchLandmark& o) {
   visit(FieldInfo{.name = "depth_closest_mm", .unit = "mm", .min = 0.01, .max = 100},
         o.depth_closest_mm);
   visit(FieldInfo{.name = "certainty", .doc = "of the position"}, o.certainty);
+  visit(FieldInfo{.name = "doubt_mm",
+                  .unit = "mm",
+                  .min = 0,
+                  .max = 1000,
+                  .doc = "expected error of a proposed point"},
+        o.doubt_mm);
   visit(FieldInfo{.name = "note", .doc = "remark of the observer"}, o.note);
   visit(FieldInfo{.name = "proposed", .doc = "by the program, not confirmed"}, o.proposed);
 }
@@ -85,6 +100,9 @@ void Fields(Visitor& visit, BenchState& o) {
   visit(FieldInfo{.name = "settings", .doc = "options that differ from start"}, o.settings);
   visit(FieldInfo{.name = "edits", .doc = "made by hand on the face"}, o.edits);
 }
+
+// The standard sites that a person has placed or confirmed.
+std::vector<SitePoint> ConfirmedSites(const BenchState& state);
 
 // The landmarks in the form of a landmark file. The file is marked `proposed` if any landmark is.
 LandmarkFile ToLandmarkFile(const BenchState& state);

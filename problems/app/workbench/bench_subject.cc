@@ -156,6 +156,7 @@ BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& contex
   CheckMesh(subject.skull.mesh, files.skull, subject);
   subject.skull.view = SimplifyForView(subject.skull.mesh, kSkullTriangles);
   subject.bone = std::make_shared<const MeshQuery>(subject.skull.mesh);
+  subject.ends = std::make_shared<const SurfaceEnds>(subject.skull.mesh);
   subject.view_bone = std::make_shared<const MeshQuery>(subject.skull.view);
   if (!files.skin.empty()) {
     context.Report("read skin");

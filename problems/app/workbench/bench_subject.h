@@ -11,6 +11,7 @@
 
 #include "problems/app/workbench/bench_state.h"
 #include "problems/experiment/experiment.h"
+#include "problems/subject/propose/suggestion_check.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {
@@ -24,6 +25,7 @@ struct BenchSubject {
   BenchMesh skull;                // with the mandible as it lies, if that is a separate mesh
   std::optional<BenchMesh> skin;  // if known
   std::shared_ptr<const MeshQuery> bone;       // of skull.mesh; null without a skull
+  std::shared_ptr<const SurfaceEnds> ends;     // of skull.mesh; null without a skull
   std::shared_ptr<const MeshQuery> view_bone;  // of skull.view; null without a skull
   std::vector<std::string> faults;             // reasons why a run would refuse the meshes
   std::vector<std::string> notes;

@@ -83,6 +83,41 @@ TEST(BenchActions, ProposalsDoNotChangeAPersonsLandmarks) {
       << "a proposal may be replaced by another";
 }
 
+LandmarkFile ProposedPoints(std::optional<double> doubt_of_n_mm) {
+  LandmarkFile file;
+  file.proposed = true;
+  for (const char* site : {"g", "n"}) {
+    Landmark& landmark = file.landmarks.emplace_back();
+    landmark.site = site;
+    landmark.point = {9, 9, 9};
+    landmark.note = "proposed";
+    landmark.doubt_mm = 2;
+  }
+  file.landmarks[1].doubt_mm = doubt_of_n_mm;
+  return file;
+}
+
+TEST(BenchActions, AMovedProposalIsAPersonsLandmark) {
+  const BenchState state = PlaceLandmark(ReplaceLandmarks({}, ProposedPoints(8)), "n", {1, 2, 3});
+  EXPECT_TRUE(state.landmarks[0].proposed);
+  EXPECT_FALSE(state.landmarks[1].proposed);
+  EXPECT_FALSE(state.landmarks[1].doubt_mm);
+  EXPECT_EQ(state.landmarks[1].note, "") << "the note explained the former point";
+}
+
+TEST(BenchActions, AllAreConfirmedOnlyAfterTheDoubtfulOnes) {
+  BenchState state = ReplaceLandmarks({}, ProposedPoints(8));
+  EXPECT_THROW(ConfirmAllLandmarks(state), InputError);
+  state = ConfirmAllLandmarks(ConfirmLandmark(std::move(state), "n"));
+  EXPECT_FALSE(ToLandmarkFile(state).proposed);
+}
+
+TEST(BenchActions, InAFileOfBothKindsOnlyPointsWithADoubtAreProposed) {
+  const BenchState state = ReplaceLandmarks({}, ProposedPoints(std::nullopt));
+  EXPECT_TRUE(state.landmarks[0].proposed);
+  EXPECT_FALSE(state.landmarks[1].proposed);
+}
+
 TEST(BenchActions, ASettingReplacesItselfAndTheOptionsBelowIt) {
   BenchState state = ChangeSetting({}, "interp.type", "\"kriging\"");
   state = ChangeSetting(state, "interp.nugget_mm", "0.1");
