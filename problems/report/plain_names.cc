@@ -22,6 +22,7 @@ const std::map<std::string_view, std::string_view>& Words() {
       {"crossed_cells", "cells that the surface crosses"},
       {"decimation_ended_by", "simplification ended by"},
       {"decimation_error_mm", "error of simplification (mm)"},
+      {"dowel_closest_rms_mm", "RMS distance of the depth markers from the face (mm)"},
       {"dowel_rms_mm", "RMS distance of the depth markers (mm)"},
       {"dowels", "depth markers"},
       {"dropped_components", "loose pieces dropped"},

@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <utility>
 
+#include "problems/report/pictures/image.h"
 #include "problems/report/plots/svg_parts.h"
 #include "problems/report/report_assets.h"
 #include "surfaces/base/atomic_file.h"
@@ -198,18 +199,32 @@ std::string TilesHtml(const std::vector<ReportTile>& tiles) {
   return html + "</dl>\n";
 }
 
-std::string NotesHtml(const Report& report) {
-  if (report.faults.empty() && report.notes.empty()) {
+std::string FaultsHtml(const std::vector<std::string>& faults) {
+  if (faults.empty()) {
+    return {};
+  }
+  std::string html = "<section class=\"notes\">\n";
+  for (const std::string& fault : faults) {
+    html += fmt::format("<p class=\"fault\">The result is not usable: {}</p>\n", EscapeHtml(fault));
+  }
+  return html + "</section>\n";
+}
+
+// The answer stays on the first screen: more notes than this are opened by a click.
+constexpr std::size_t kShownNotes = 3;
+
+std::string NotesHtml(const std::vector<std::string>& notes) {
+  if (notes.empty()) {
     return {};
   }
   std::string html = "<section class=\"notes\">\n<h2 id=\"notes\">Notes</h2>\n";
-  for (const std::string& fault : report.faults) {
-    html += fmt::format("<p class=\"fault\">The result is not usable: {}</p>\n", EscapeHtml(fault));
+  for (std::size_t k = 0; k < notes.size(); ++k) {
+    if (k == kShownNotes) {
+      html += fmt::format("<details><summary>{} more</summary>\n", notes.size() - k);
+    }
+    html += fmt::format("<p>{}</p>\n", EscapeHtml(notes[k]));
   }
-  for (const std::string& note : report.notes) {
-    html += fmt::format("<p>{}</p>\n", EscapeHtml(note));
-  }
-  return html + "</section>\n";
+  return html + (notes.size() > kShownNotes ? "</details>\n" : "") + "</section>\n";
 }
 
 std::string ScoreHtml(const Report& report) {
@@ -228,14 +243,14 @@ std::string ScoreHtml(const Report& report) {
 // The ids and headings of the page's sections, in order.
 std::vector<std::pair<std::string, std::string>> Headings(const Report& report) {
   std::vector<std::pair<std::string, std::string>> headings;
-  if (!report.faults.empty() || !report.notes.empty()) {
-    headings.emplace_back("notes", "Notes");
-  }
   if (!report.scenes.empty()) {
     headings.emplace_back("view", "In three dimensions");
   }
   if (!report.tiles.empty() || !report.score_images.empty()) {
     headings.emplace_back("score", report.score_heading);
+  }
+  if (!report.notes.empty()) {
+    headings.emplace_back("notes", "Notes");
   }
   for (std::size_t k = 0; k < report.sections.size(); ++k) {
     headings.emplace_back(fmt::format("s{}", k + 1), report.sections[k].heading);
@@ -353,7 +368,8 @@ std::vector<ReportTable> WithoutEmptyTables(std::vector<ReportTable> tables) {
 
 ReportImage ReportImageFromFile(const std::filesystem::path& path, std::string caption,
                                 std::string alt, std::vector<Legend> legends) {
-  return {.bytes = ReadFileBytes(path),
+  std::string bytes = ReadFileBytes(path);
+  return {.bytes = path.extension() == ".png" ? PagePng(bytes) : std::move(bytes),
           .caption = std::move(caption),
           .alt = std::move(alt),
           .legends = std::move(legends)};
@@ -377,12 +393,11 @@ std::string ReportHtml(const Report& report) {
   if (!report.subtitle.empty()) {
     html += fmt::format("<p class=\"subtitle\">{}</p>\n", EscapeHtml(report.subtitle));
   }
-  html += "</header>\n" + NavigationHtml(report) + "<main>\n" + NotesHtml(report) +
-          ViewHtml(report.scenes, report.scenes_note);
+  html += "</header>\n" + NavigationHtml(report) + "<main>\n" + FaultsHtml(report.faults);
   for (const ReportImage& image : report.main_images) {
     html += ImageHtml(image);
   }
-  html += ScoreHtml(report);
+  html += ViewHtml(report.scenes, report.scenes_note) + ScoreHtml(report) + NotesHtml(report.notes);
   for (std::size_t i = 0; i < report.sections.size(); ++i) {
     html += SectionHtml(report.sections[i], i + 1);
   }

@@ -56,7 +56,8 @@ struct ReportImage {
   std::vector<Legend> legends = {};  // keys to its colours, between picture and caption
 };
 
-// Throws IoError if the file cannot be read.
+// A picture from a file. A PNG becomes one for a page (PagePng, pictures/image.h). Throws IoError
+// if the file cannot be read.
 ReportImage ReportImageFromFile(const std::filesystem::path& path, std::string caption,
                                 std::string alt, std::vector<Legend> legends = {});
 
@@ -73,15 +74,16 @@ struct ReportSection {
   bool folded = false;            // shown by its heading alone until it is opened
 };
 
-// The page shows its parts in this order.
+// The page shows the answer first: faults, main pictures, 3-D view, numbers, notes, sections.
 struct Report {
   std::string title;
   std::string subtitle;
-  std::vector<std::string> faults = {};  // why the result is not usable; in red above the notes
-  std::vector<std::string> notes = {};   // warnings that a reader needs first
-  std::string scenes = {};               // CollectScenes (scene_json.h) for the 3-D view, or empty
-  std::string scenes_note = {};          // below the 3-D view; may be empty
+  std::vector<std::string> faults = {};  // why the result is not usable; in red above all else
+  // The most important first, below the numbers. From the fourth on they are folded away.
+  std::vector<std::string> notes = {};
   std::vector<ReportImage> main_images = {};  // the first pictures, usually one
+  std::string scenes = {};       // CollectScenes (scene_json.h) for the 3-D view, or empty
+  std::string scenes_note = {};  // below the 3-D view; may be empty
   std::string score_heading = "In figures";
   std::vector<ReportTile> tiles = {};          // the key numbers
   std::vector<ReportImage> score_images = {};  // pictures that belong to the key numbers

@@ -11,6 +11,7 @@
 #include "fitting/relaxation/dowel_mesh.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/quantile.h"
+#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {
 namespace {
@@ -275,6 +276,7 @@ void AddNetwork(const RunResult& result, Json& json) {
 
 Json FitJson(const RunResult& result) {
   Json json = {{"dowel_rms_mm", result.fit.dowel_rms_mm},
+               {"dowel_closest_rms_mm", MarkerRms_mm(result)},
                {"point_rms_mm", result.fit.point_rms_mm},
                {"points", result.target.points.size()},
                {"seeds", result.seeding.points.size()},
@@ -367,6 +369,20 @@ Json BoneJson(const RunResult& result) {
 }
 
 }  // namespace
+
+double MarkerRms_mm(const RunResult& result) {
+  const MeshQuery face(result.face.mesh);
+  double squares = 0;
+  int count = 0;
+  for (const Dowel& dowel : result.subject.dowels_on_bone) {
+    if (std::isfinite(dowel.depth_mm)) {
+      const double distance_mm = face.Closest(dowel.Tip()).distance_mm;
+      squares += distance_mm * distance_mm;
+      ++count;
+    }
+  }
+  return count > 0 ? std::sqrt(squares / count) : kNaN;
+}
 
 Json ResultJson(const Experiment& experiment, const RunResult& result) {
   Json json = {{"title", experiment.title},

@@ -21,6 +21,11 @@ namespace semblance::problems {
 // result.json of a run: its metrics and counts.
 nlohmann::ordered_json ResultJson(const Experiment& experiment, const RunResult& result);
 
+// The RMS distance of the depth markers' tips from the closest point of the recovered face; NaN
+// without depths. (fit.dowel_rms_mm is that to each marker's own (u,v), from where the surface may
+// have slid along itself.)
+double MarkerRms_mm(const RunResult& result);
+
 // n, stated, certain, the errors, the proper scores (an infinite log_score is null), coverage_50,
 // _90, _95, mean_sd_mm and pit.
 nlohmann::ordered_json ScoresToJson(const DepthScores& scores);

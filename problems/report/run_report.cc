@@ -3,6 +3,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -37,31 +39,67 @@ std::string Percent(const Json& share) {
   return share.is_null() ? "" : TablePercent(share.get<double>());
 }
 
+// In percent.
+std::string InventedShare(const Json& bone) {
+  const double observed = bone.at("observed_cm2").get<double>();
+  const double invented =
+      bone.at("mirrored_cm2").get<double>() + bone.at("inferred_cm2").get<double>();
+  return TablePercent(invented / (observed + invented));
+}
+
 // The folder of an older version has no uncertainty.
 bool HasSigma(const Json& result) {
   return result.contains("uncertainty") && !result.at("uncertainty").is_null() &&
          !result.at("uncertainty").at("sigma_median_mm").is_null();
 }
 
+// The distance to the face's closest point. Folders of older versions only have the distance to
+// each marker's own (u,v), which is larger where the surface slid along itself.
+ReportTile MarkerTile(const Json& fit) {
+  const bool has_closest = fit.contains("dowel_closest_rms_mm");
+  return {"depth markers", Number(fit.at(has_closest ? "dowel_closest_rms_mm" : "dowel_rms_mm")),
+          "mm",
+          has_closest ? "RMS distance from the markers' tips to the face: how well the face keeps "
+                        "the tissue depths"
+                      : "RMS distance from the markers' tips to their places on the face"};
+}
+
+// Three numbers. The tables below have the others.
 std::vector<ReportTile> Tiles(const Json& result) {
   const Json& face = result.at("face");
-  const Json& fit = result.at("fit");
   std::vector<ReportTile> tiles;
   if (!face.is_null()) {
     tiles = {{"mean error", Number(face.at("mean_abs_mm")), "mm",
-              "recovered face against the true skin"},
-             {"RMS error", Number(face.at("rms_mm")), "mm", ""},
-             {"median", Number(face.at("median_mm")), "mm", ""},
-             {"95th percentile", Number(face.at("p95_mm")), "mm", ""},
-             {"within 2.5 mm", Percent(face.at("within_2_5mm")), "%", "of the scored area"}};
+              "mean distance between the recovered face and the true skin"},
+             {"within 2.5 mm", Percent(face.at("within_2_5mm")), "%",
+              "share of the scored skin; people hardly see smaller differences"}};
   }
-  tiles.push_back({"depth markers", Number(fit.at("dowel_rms_mm")), "mm",
-                   "RMS from the markers' tips to the face"});
-  if (HasSigma(result)) {
+  tiles.push_back(MarkerTile(result.at("fit")));
+  if (face.is_null() && HasSigma(result)) {
     tiles.push_back({"may be off", Number(result.at("uncertainty").at("sigma_median_mm")), "mm",
-                     "median standard deviation of the face along its normal"});
+                     "expected error of the face (median standard deviation); people of the same "
+                     "skull differ by that much"});
+  }
+  if (face.is_null() && result.contains("bone")) {
+    tiles.push_back({"invented bone", InventedShare(result.at("bone")), "%",
+                     "share of the bone under the face that the scan does not show"});
   }
   return tiles;
+}
+
+// The most important first. A reader has to act on a warning of the first group, and to know one of
+// the second; all others report routine corrections.
+std::vector<std::string> SortedNotes(std::vector<std::string> notes) {
+  constexpr std::array kActs = {"no person has confirmed", "fractur",  "exchanged",
+                                "mirrored volume",         "seems to", "is not trusted"};
+  constexpr std::array kMatters = {"cut off",     "dropped",  "left out because",
+                                   "no dowel at", "mirrored", "beyond"};
+  const auto rank = [&](const std::string& note) {
+    const auto has = [&](const char* words) { return note.find(words) != std::string::npos; };
+    return std::ranges::any_of(kActs, has) ? 0 : std::ranges::any_of(kMatters, has) ? 1 : 2;
+  };
+  std::ranges::stable_sort(notes, {}, rank);
+  return notes;
 }
 
 std::vector<std::string> MetricsRow(const std::string& name, const Json& s) {
@@ -506,7 +544,7 @@ Report BuildReport(const Json& result, const OutputFolder& folder) {
   report.subtitle = "Facial approximation of " + result.at("subject").get<std::string>() +
                     ". An approximation, not an identification.";
   report.faults = result.value("faults", std::vector<std::string>());
-  report.notes = result.at("notes").get<std::vector<std::string>>();
+  report.notes = SortedNotes(result.at("notes").get<std::vector<std::string>>());
   report.tiles = Tiles(result);
   report.score_heading = result.at("face").is_null() ? "In figures" : "Score";
   report.score_images = ScoreImages(result.at("face"), folder);

@@ -12,6 +12,7 @@
 
 #include "problems/config/terminal_text.h"
 #include "problems/report/plain_names.h"
+#include "problems/report/result_json.h"
 #include "problems/report/run_pictures.h"
 #include "problems/report/view/view_mesh.h"
 #include "surfaces/base/json_text.h"
@@ -236,7 +237,7 @@ class SceneWriter {
       facts.push_back(fmt::format("RMS {:.2f} mm", s.rms_mm));
       facts.push_back(fmt::format("within 2.5 mm {:.0f} %", 100 * s.within_2_5mm));
     }
-    facts.push_back(fmt::format("depth markers: RMS {:.2f} mm", result_.fit.dowel_rms_mm));
+    facts.push_back(fmt::format("depth markers: RMS {:.2f} mm", MarkerRms_mm(result_)));
     return facts;
   }
 

@@ -5,7 +5,9 @@
 #include <png.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
 #include "problems/io/output_folder.h"
 #include "surfaces/base/error.h"
@@ -65,7 +67,89 @@ bool IsInside(const Image& image, int x, int y) {
   return x >= 0 && y >= 0 && x < image.width && y < image.height;
 }
 
+// Reads a PNG file as rows of red, green, blue and alpha.
+struct RgbaImage {
+  int width = 0, height = 0;  // pixels
+  std::vector<std::uint8_t> bytes;
+};
+
+RgbaImage DecodePng(const std::string& png) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_memory(&header, png.data(), png.size()) == 0) {
+    throw InputError("picture: libpng cannot read it; it is no PNG file");
+  }
+  header.format = PNG_FORMAT_RGBA;
+  RgbaImage image{.width = static_cast<int>(header.width),
+                  .height = static_cast<int>(header.height),
+                  .bytes = std::vector<std::uint8_t>(PNG_IMAGE_SIZE(header))};
+  if (png_image_finish_read(&header, nullptr, image.bytes.data(), 0, nullptr) == 0) {
+    throw InputError("picture: libpng cannot read it; the PNG file is damaged");
+  }
+  return image;
+}
+
+void ClearBackground(RgbaImage& image) {
+  for (int y = 0; y < image.height; ++y) {
+    std::uint8_t* const row = &image.bytes[4 * static_cast<std::size_t>(y) * image.width];
+    const std::array<std::uint8_t, 3> first = {row[0], row[1], row[2]};
+    for (int x = 0; x < image.width; ++x) {
+      if (std::equal(first.begin(), first.end(), row + 4 * x)) {
+        row[4 * x + 3] = 0;
+      }
+    }
+  }
+}
+
+// Means of two by two pixels, weighted by alpha. An odd last row or column is left out.
+RgbaImage Halved(const RgbaImage& image) {
+  RgbaImage half{
+      .width = std::max(image.width / 2, 1), .height = std::max(image.height / 2, 1), .bytes = {}};
+  for (int y = 0; y < half.height; ++y) {
+    for (int x = 0; x < half.width; ++x) {
+      std::array<unsigned, 4> sums = {};  // colours times alpha, alpha
+      for (const auto& [dx, dy] : {std::pair(0, 0), {1, 0}, {0, 1}, {1, 1}}) {
+        const int column = std::min(2 * x + dx, image.width - 1);
+        const int row = std::min(2 * y + dy, image.height - 1);
+        const std::uint8_t* const p =
+            &image.bytes[4 * (static_cast<std::size_t>(row) * image.width + column)];
+        for (int c = 0; c < 3; ++c) {
+          sums[c] += p[c] * p[3];
+        }
+        sums[3] += p[3];
+      }
+      for (int c = 0; c < 3; ++c) {
+        half.bytes.push_back(static_cast<std::uint8_t>(sums[3] > 0 ? sums[c] / sums[3] : 0));
+      }
+      half.bytes.push_back(static_cast<std::uint8_t>(sums[3] / 4));
+    }
+  }
+  return half;
+}
+
+std::string EncodeRgba(const RgbaImage& image) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  header.width = static_cast<png_uint_32>(image.width);
+  header.height = static_cast<png_uint_32>(image.height);
+  header.format = PNG_FORMAT_RGBA;
+  std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(header), '\0');
+  png_alloc_size_t size = bytes.size();
+  if (png_image_write_to_memory(&header, bytes.data(), &size, 0, image.bytes.data(), 0, nullptr) ==
+      0) {
+    throw InputError("picture: libpng cannot write it");
+  }
+  bytes.resize(size);
+  return bytes;
+}
+
 }  // namespace
+
+std::string PagePng(const std::string& png) {
+  RgbaImage image = DecodePng(png);
+  ClearBackground(image);
+  return EncodeRgba(Halved(image));
+}
 
 Colour HexColour(std::uint32_t rrggbb) {
   return {((rrggbb >> 16) & 255) / 255.0, ((rrggbb >> 8) & 255) / 255.0, (rrggbb & 255) / 255.0};

@@ -53,6 +53,11 @@ void Paste(Image& onto, const Image& picture, int x, int y);
 // takes half the time of kSmall and gives 20 % more bytes, for flat colours up to a third more.
 enum class PngEffort { kSmall, kQuick };
 
+// A rendered picture for a page: half as wide and high, a quarter of the bytes. Its background is
+// transparent, so that the page shows its own behind it, light or dark: the pixels of a row that
+// have the colour of its first pixel. Throws InputError for bytes that are no PNG file of 8 bits.
+std::string PagePng(const std::string& png);
+
 // The bytes of a PNG file. The same picture gives the same bytes, because the file holds no time
 // and no comment. Throws InputError for a picture without pixels.
 std::string EncodePng(const Image& image, PngEffort effort = PngEffort::kSmall);

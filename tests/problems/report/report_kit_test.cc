@@ -112,7 +112,7 @@ TEST(Html, TagsAreBalanced) {
   pugi::xml_document document;
   const pugi::xml_parse_result parsed = document.load_string(xml.c_str());
   EXPECT_TRUE(parsed) << parsed.description() << ": " << xml.substr(parsed.offset, 80);
-  EXPECT_STREQ(document.select_node("//section[1]/h2").node().attribute("id").value(), "notes");
+  EXPECT_STREQ(document.select_node("//section[1]/h2").node().attribute("id").value(), "score");
   // Each entry of the contents leads to a heading, and each heading is there.
   std::vector<std::string> ids, links;
   for (const auto& heading : document.select_nodes("//h2")) {
@@ -158,13 +158,25 @@ TEST(Html, AnSvgIsPartOfThePage) {
                         "&quot;plot&quot;\" width=\"2\"><circle/></svg>"));
 }
 
-TEST(Html, NotesThenPicturesThenTheScoreThenTheRest) {
+TEST(Html, OnlyTheFirstThreeNotesAreShownAtOnce) {
+  Report report = Full();
+  report.notes = {"first", "second", "third"};
+  EXPECT_THAT(ReportHtml(report), Not(HasSubstr(" more</summary>")));
+  report.notes.insert(report.notes.end(), {"fourth", "fifth"});
+  const std::string html = ReportHtml(report);
+  const std::size_t fold = html.find("<details><summary>2 more</summary>");
+  ASSERT_NE(fold, html.npos);
+  EXPECT_LT(html.find("<p>third</p>"), fold);
+  EXPECT_GT(html.find("<p>fourth</p>"), fold);
+}
+
+TEST(Html, PicturesThenTheScoreThenNotesThenTheRest) {
   const std::string html = ReportHtml(Full());
   const std::vector<std::string> order = {"<nav ",
-                                          "id=\"notes\"",
                                           "alt=\"the recovered face\"",
                                           "id=\"score\"",
                                           "class=\"tiles\"",
+                                          "id=\"notes\"",
                                           "id=\"s1\"",
                                           "<details class=\"fold\"><summary><h2 id=\"s2\">"};
   std::size_t at = 0;

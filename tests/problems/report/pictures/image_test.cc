@@ -56,6 +56,35 @@ TEST(Png, AnotherReaderSeesTheSamePixels) {
   }
 }
 
+// A black square on rows of different greys: the greys become transparent, the square stays black.
+TEST(Png, APictureForAPageIsHalfAsLargeOnATransparentBackground) {
+  Image image = MakeImage(40, 20, {1, 1, 1});
+  for (int y = 0; y < 20; ++y) {
+    FillRectangle(image, 0, y, 40, 1, {0.9 - 0.01 * y, 0.9, 0.9});
+  }
+  FillRectangle(image, 10, 6, 20, 8, {0, 0, 0});
+  const std::string bytes = PagePng(EncodePng(image));
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  ASSERT_NE(png_image_begin_read_from_memory(&png, bytes.data(), bytes.size()), 0);
+  ASSERT_EQ(png.width, 20u);
+  ASSERT_EQ(png.height, 10u);
+  png.format = PNG_FORMAT_RGBA;
+  std::vector<std::uint8_t> pixels(PNG_IMAGE_SIZE(png), 77);
+  ASSERT_NE(png_image_finish_read(&png, nullptr, pixels.data(), 0, nullptr), 0);
+  for (int y = 0; y < 10; ++y) {
+    for (int x = 0; x < 20; ++x) {
+      const bool is_square = x >= 5 && x < 15 && y >= 3 && y < 7;
+      const std::uint8_t* const p = &pixels[4 * (20 * y + x)];
+      EXPECT_EQ(p[3], is_square ? 255 : 0) << x << " " << y;
+      if (is_square) {
+        EXPECT_EQ(p[0] + p[1] + p[2], 0) << x << " " << y;
+      }
+    }
+  }
+  EXPECT_THROW(PagePng("no picture"), InputError);
+}
+
 TEST(Png, SameBytesEachTimeWithoutATimestamp) {
   const std::string bytes = EncodePng(Gradient(40, 30));
   EXPECT_EQ(bytes, EncodePng(Gradient(40, 30)));
