@@ -37,6 +37,8 @@ demo demo-phantom deb: PRESET = quick
 demo: configure
 	@cmake --build --preset quick --target semblance
 	@build-quick/problems/semblance run configs/demo.yaml --out $(DEMO_OUT) --force
+	@echo "this head in the browser:  build-quick/problems/semblance workbench configs/demo.yaml --out out/workbench"
+	@echo "your own CT or skull:      build-quick/problems/semblance workbench YOUR_CT_OR_SKULL --out out/mine"
 
 # Every step on a synthetic head that lacks a cheek bone: its CT as DICOM, skull and skin, proposed landmarks and their errors, the mirrored
 # cheek, face and head, the score.

@@ -40,6 +40,7 @@
 #include "problems/study/report/study_report.h"
 #include "problems/study/study_plan.h"
 #include "surfaces/base/error.h"
+#include "surfaces/decimate/decimate.h"
 #include "surfaces/mesh/mesh_check.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
@@ -129,6 +130,8 @@ int RunCommand(const Arguments& arguments) {
     PrintFaceError("recovered face", result.truth->face);
   }
   Tell("report: {}\n", (folder.Root() / "report.html").string());
+  Tell("next: open the report in a browser; semblance workbench {} changes this face there\n",
+       config.string());
   return PrintFaults(faults);
 }
 
@@ -327,7 +330,16 @@ void WriteSkin(const TriMesh& skin, int dropped, OutputFolder& folder) {
   Tell("skin.ply: {} triangles; {} smaller pieces dropped\n", skin.triangles.size(), dropped);
 }
 
-void WriteImport(const CtImport& import, OutputFolder& folder) {
+// Marching cubes make triangles of the size of a voxel also where the bone is flat. 0.1 mm is a
+// tenth of the finest voxels, and far less than the uncertainty of the edges.
+TriMesh Thinned(const TriMesh& mesh) {
+  constexpr double kTolerance_mm = 0.1;
+  return Decimate(mesh, {.tolerance_mm = kTolerance_mm}).mesh;
+}
+
+void WriteImport(CtImport import, OutputFolder& folder) {
+  import.skull = Thinned(import.skull);
+  import.skin = Thinned(import.skin);
   CheckHeadMesh(import.skull, "the imported skull");
   folder.Write("skull.ply", EncodeMesh(import.skull, ".ply"));
   Tell("skull.ply: {} triangles\n", import.skull.triangles.size());
@@ -369,11 +381,11 @@ int ImportCtCommand(const Arguments& arguments) {
   const std::filesystem::path root = std::filesystem::absolute(folder.Root()).lexically_normal();
   Tell("folder: {}\n", root.string());
   if (!mr) {
+    const std::string skull = (folder.Root() / "skull.ply").string();
     Tell(
-        "next: pick landmarks on skull.ply (3D Slicer, MeshLab, CloudCompare; "
-        "docs/tutorial/first-face.md), "
-        "then\n  semblance landmarks convert PICKED {}\n",
-        (folder.Root() / "landmarks.yaml").string());
+        "next: semblance workbench {0}\n  places the landmarks and makes the face in a browser. "
+        "Without one:\n  semblance landmarks propose {0} --out {1}\n",
+        skull, (folder.Root() / "landmarks.yaml").string());
   }
   return kDone;
 }

@@ -298,6 +298,23 @@ std::vector<DicomHeader> WithCommonUids(std::vector<DicomHeader> headers,
   return headers;
 }
 
+// The slices of one series may lie on several grids, as with a scout or a reformatted part. Keeps
+// the grid with most slices if it has twice as many as each other one.
+void KeepMainGrid(std::vector<const DicomSeries*>& grids) {
+  if (grids.size() < 2) {
+    return;
+  }
+  std::ranges::stable_sort(grids, std::ranges::greater{},
+                           [](const DicomSeries* s) { return s->slices.size(); });
+  const DicomSeries& most = *grids.front();
+  const bool one_series = std::ranges::all_of(grids, [&](const DicomSeries* s) {
+    return s->First().series_uid == most.First().series_uid;
+  });
+  if (one_series && most.slices.size() >= 2 * grids[1]->slices.size()) {
+    grids.resize(1);
+  }
+}
+
 std::vector<const DicomSeries*> Pointers(const std::vector<DicomSeries>& all) {
   std::vector<const DicomSeries*> pointers;
   pointers.reserve(all.size());
@@ -349,6 +366,7 @@ const DicomSeries& ChooseSeries(const std::vector<DicomSeries>& all, const std::
   if (wanted.empty() || (fitting.size() > 1 && heads.size() == 1)) {
     fitting = heads;
   }
+  KeepMainGrid(fitting);
   if (fitting.empty()) {
     throw InputError(fmt::format(
         "{}: {}; the series are:{}", where,

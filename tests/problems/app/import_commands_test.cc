@@ -41,7 +41,7 @@ TEST_F(ImportCommands, ASeriesBecomesSkullAndSkinAndTheNextCommandIsPrinted) {
   EXPECT_TRUE(fs::exists(folder_ / "out/skull.ply"));
   EXPECT_TRUE(fs::exists(folder_ / "out/skin.ply"));
   EXPECT_THAT(outcome.out, AllOf(HasSubstr("note: series 1: CT"), HasSubstr("head holder"),
-                                 HasSubstr("next: pick landmarks on skull.ply")));
+                                 HasSubstr("next: semblance workbench out/skull.ply")));
 }
 
 TEST_F(ImportCommands, OnlyTheSkinOfAnMrIsImported) {

@@ -248,6 +248,25 @@ TEST_F(DicomMistakesTest, ASliceOfAnotherGridIsReportedAndRoundingIsNot) {
   EXPECT_EQ(reading.volume.slices, array_.counts[2]);
 }
 
+// Half as many slices of another size are no second head; as many of them may be.
+TEST_F(DicomMistakesTest, TheMainGridOfASeriesIsTaken) {
+  WriteDicom(folder_ / "ct", array_);
+  VoxelArray other = array_;
+  other.steps.col(0) *= 1.3;
+  const int half = array_.counts[2] / 2;
+  for (int k = 0; k < half; ++k) {
+    WriteDicomSlice(folder_ / "ct" / fmt::format("other{}", k), other, k, {});
+  }
+  const VolumeReading reading = Read("ct");
+  EXPECT_EQ(reading.volume.slices, array_.counts[2]);
+  EXPECT_THAT(reading.notes, Contains(AllOf(HasSubstr("series left out: 1:"),
+                                            HasSubstr(fmt::format("{} slices of", half)))));
+  for (int k = half; k < array_.counts[2]; ++k) {
+    WriteDicomSlice(folder_ / "ct" / fmt::format("other{}", k), other, k, {});
+  }
+  EXPECT_THAT(Words("ct"), HasSubstr("2 series; choose one"));
+}
+
 TEST_F(DicomMistakesTest, EverySecondSliceMissingIsNoted) {
   WriteDicom(folder_ / "ct", array_, {.more = {{"0018|0050", "3.5"}}});
   for (int k = 1; k < array_.counts[2]; k += 2) {
