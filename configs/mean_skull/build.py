@@ -347,5 +347,26 @@ def main(population, out):
     finish(heads, out)
 
 
+def align(folder):
+    """Turns and scales all three files so that the sites lie on those of the average skull."""
+    lines = [r.split(',') for r in open(folder + '/sites.csv').read().split()[1:]]
+    sites = np.array([[float(c) for c in r[1:4]] for r in lines])
+    a, b = similarity(sites, np.array(AVERAGE, float))
+    off = [r for r in open(folder + '/mean.off') if r[0] not in '#O']
+    n = int(off[0].split()[0])
+    points = np.array([r.split() for r in off[1:n + 1]], float) @ a.T + b
+    triangles = np.array([r.split()[1:] for r in off[n + 1:]], int)
+    modes = np.genfromtxt(folder + '/modes.csv', delimiter=',', skip_header=1) / 10
+    modes = (modes.reshape(n, MODES, 3) @ a.T).transpose(1, 0, 2).reshape(MODES, -1)
+    write(folder, points, triangles, modes)
+    with open(folder + '/sites.csv', 'w') as f:
+        f.write('site,x,y,z,error_mm\n')
+        for r, p in zip(lines, sites @ a.T + b):
+            f.write('{},{:.2f},{:.2f},{:.2f},{}\n'.format(r[0], *(p + 0.0), r[4]))
+
+
 if __name__ == '__main__':
-    main(sys.argv[1], sys.argv[2])
+    if sys.argv[1] == '--align':
+        align(sys.argv[2])
+    else:
+        main(sys.argv[1], sys.argv[2])
