@@ -122,8 +122,7 @@ std::string FriedmanWords(const FriedmanResult& f) {
         "differ, "
         "each order would be equally likely, and this would happen with a probability of {}.",
         f.subjects, f.treatments,
-        log10_p > -4 ? fmt::format("{:.2g}", std::pow(10, log10_p))
-                     : fmt::format("10^{:.0f}", std::floor(log10_p)));
+        log10_p > -300 ? fmt::format("{:.2g}", std::pow(10, log10_p)) : "less than 1e-300");
   }
   return fmt::format(
       "Over {} subjects and {} treatments, Friedman's chi-square is {:.3f}. In Iman and "
