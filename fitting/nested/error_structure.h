@@ -28,8 +28,8 @@ struct FileRuns {
   static constexpr std::uint32_t kNone = 0xffffffff;
 };
 // Finds the runs of a file in which consecutive points are neighbours; a run ends where the next
-// point is far away, or where the way turns back. No runs if the file has another order, or fewer than twenty runs, or
-// more than two million points.
+// point is far away, or where the way turns back. No runs if the file has another order, or fewer
+// than twenty runs, or more than two million points.
 FileRuns FindFileRuns(const NestedPoints& points);
 
 // The design effect of correlated residuals: the variance of sums of residuals over that of

@@ -584,10 +584,6 @@ class NestedFitter {
     if (DropOutliers(std::sqrt(chosen.score))) {
       chosen = FitAll(best.known);
     }
-    if (const double weight = WeightByRuns(); weight > weight_) {
-      report_.by_runs = true;
-      chosen = FitAll(weight);
-    }
     const double mean_weight = points_.mean_weight;
     if (ReinstateSteps(std::sqrt(chosen.score))) {
       chosen.mean_square *= mean_weight / points_.mean_weight;  // now of the new mean weight
@@ -604,123 +600,6 @@ class NestedFitter {
     return result;
   }
 
-  // Returns the smoothness that predicts whole runs of the file best, if it is clearly smoother
-  // than that of the last solution. Runs that drift, as a scanner's lines, look like detail to
-  // random points held out. Detail varies along the runs; where the means of the runs explain
-  // little of the residuals, the weight stays.
-  double WeightByRuns() {
-    runs_ = FindFileRuns(points_);
-    if (runs_.count == 0) {
-      return weight_;
-    }
-    const NestedSolve::Packed solution = solve_.Solution();
-    const RunSplit split = SplitRuns();
-    solve_.Begin(space_, PointChoice{.left_out = split.not_fitted}, metric_);
-    const double weight = SmoothestByRuns(split);
-    solve_.Enter(space_);
-    solve_.SetSolution(solution);
-    return weight;
-  }
-
-  struct RunSplit {
-    std::vector<char> not_fitted, not_held;  // per point
-  };
-  // Holds out one run in five.
-  RunSplit SplitRuns() const {
-    RunSplit split{.not_fitted = outlier_, .not_held = outlier_};
-    for (std::uint32_t k = 0; k < points_.size(); ++k) {
-      const std::uint64_t bits = (std::uint64_t{runs_.run[k]} + 1) * 0xD1B54A32D192ED03u;
-      const bool is_held = runs_.run[k] != FileRuns::kNone && (bits ^ bits >> 31) % 5 == 0;
-      split.not_fitted[k] |= is_held ? 1 : 0;
-      split.not_held[k] |= is_held ? 0 : 1;
-    }
-    return split;
-  }
-
-  // The mean square may rise before it falls: half-smoothed lines swing between their neighbours.
-  double SmoothestByRuns(const RunSplit& split) {
-    constexpr double kFactor = 8, kMaxRatio = 1e8;
-    const std::vector<double> start = RunSquares(split, weight_);
-    std::vector<double> best = start;
-    double weight = weight_;
-    for (double next = kFactor * weight_; next < kMaxRatio * weight_; next *= kFactor) {
-      const std::vector<double> squares = RunSquares(split, next);
-      const double mean = FiniteMean(squares), least = FiniteMean(best);
-      if (mean < least) {
-        best = squares;
-        weight = next;
-      }
-    }
-    return weight > weight_ && IsClearlyLess(best, start) && RunsShareErrors(split, weight)
-               ? weight
-               : weight_;
-  }
-
-  static double FiniteMean(const std::vector<double>& values) {
-    double sum = 0, count = 0;
-    for (const double value : values) {
-      sum += std::isfinite(value) ? value : 0;
-      count += std::isfinite(value) ? 1 : 0;
-    }
-    return sum / count;
-  }
-
-  // The mean squares of the held-out runs at a weight; NaN for the others.
-  std::vector<double> RunSquares(const RunSplit& split, double weight) {
-    std::vector<double> squares(runs_.count, 0), counts(runs_.count, 0);
-    ForEachHeld(split, weight, [&](std::uint32_t run, const Residual& residual) {
-      squares[run] += residual.Square();
-      counts[run] += 1;
-    });
-    for (std::size_t run = 0; run < squares.size(); ++run) {
-      squares[run] = counts[run] > 0 ? squares[run] / counts[run] : kNaN;
-    }
-    return squares;
-  }
-
-  template <class Visit>
-  void ForEachHeld(const RunSplit& split, double weight, const Visit& visit) {
-    solve_.SetWeight(weight);
-    solve_.Solve(least_gain_);
-    const std::vector<Residual> residuals = solve_.Residuals({.left_out = split.not_held});
-    std::size_t n = 0;
-    for (std::uint32_t k = 0; k < points_.size(); ++k) {
-      if (split.not_held[k] == 0) {
-        visit(runs_.run[k], Scaled(residuals[n++], k));
-      }
-    }
-  }
-
-  static bool IsClearlyLess(const std::vector<double>& next, const std::vector<double>& best) {
-    constexpr double kErrors = 1;  // few runs are held out; RunsShareErrors must hold too
-    double sum = 0, squares = 0, count = 0;
-    for (std::size_t n = 0; n < next.size(); ++n) {
-      if (const double gain = best[n] - next[n]; std::isfinite(gain)) {
-        sum += gain;
-        squares += gain * gain;
-        count += 1;
-      }
-    }
-    return sum > kErrors * std::sqrt(std::max(squares - sum * sum / std::max(count, 1.0), 0.0));
-  }
-
-  // Returns whether the means of the held-out runs explain much of their residuals.
-  bool RunsShareErrors(const RunSplit& split, double weight) {
-    constexpr double kShare = 0.5;  // detail with some waves along a run has next to none
-    std::vector<Vec3> sums(runs_.count, Vec3::Zero());
-    std::vector<double> counts(runs_.count, 0);
-    double squares = 0, of_means = 0;
-    ForEachHeld(split, weight, [&](std::uint32_t run, const Residual& residual) {
-      sums[run] += Vec3(residual.along[0], residual.along[1], residual.along[2]);
-      counts[run] += 1;
-      squares += residual.Square();
-    });
-    for (std::size_t run = 0; run < sums.size(); ++run) {
-      of_means += counts[run] > 0 ? sums[run].squaredNorm() / counts[run] : 0;
-    }
-    return of_means > kShare * squares;
-  }
-
   // Computes the distances and their statistics, in the order of the curve (invariant 8).
   void Measure(NestedFitResult& result) {
     constexpr std::size_t kAtOnce = 1 << 14;  // points; bounds the memory
@@ -728,7 +607,8 @@ class NestedFitter {
     result.residual_mm.resize(points_.GivenSize());
     NestedResiduals residuals(solve_);
     PairCorrelation neighbours;
-    DesignEffect effect(runs_);
+    const FileRuns runs = FindFileRuns(points_);
+    DesignEffect effect(runs);
     std::optional<Residual> last;
     for (std::size_t begin = 0; begin < points_.size(); begin += kAtOnce) {
       const std::size_t end = std::min(begin + kAtOnce, points_.size());
@@ -884,7 +764,6 @@ class NestedFitter {
   // Errors that points share.
   double least_noise_square_;      // RoundingNoise
   bool is_rounded_below_ = false;  // of the last search
-  FileRuns runs_;                  // none before WeightByRuns
   // The progress.
   bool densified_ = false;        // Densify has overlaid a whole level
   std::optional<Snapshot> best_;  // invariant 5

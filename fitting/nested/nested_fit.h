@@ -47,7 +47,6 @@ struct AutoReport {
   double neighbour_correlation = kNaN;  // of residuals of consecutive points on the curve
   double effective_share = 1;           // independent points per point, by correlated residuals
   double lattice_mm = 0;                // step of heights that were rounded to it; 0: they were not
-  bool by_runs = false;                 // smoothness was chosen by whole runs of the file held out
   bool outliers_together = false;       // outliers stand together, as on a narrow ridge
   bool weighted = false;                // the points' weights differ
   bool met_to_rounding = false;         // held-out points are met to 1e-8 of the extent

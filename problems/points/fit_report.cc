@@ -108,7 +108,6 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"neighbour_correlation", r.neighbour_correlation},
                {"effective_share", r.effective_share},
                {"lattice_mm", r.lattice_mm},
-               {"smoothness_by_runs", r.by_runs},
                {"outliers_together", r.outliers_together},
                {"met_to_rounding", r.met_to_rounding},
                {"limited_by_density", r.limited_by_density},
@@ -146,10 +145,6 @@ std::string AutoText(const AutoReport& r, std::string_view unit) {
     text +=
         fmt::format("heights are whole multiples of {}: the surface does not follow the rounding\n",
                     LengthText(r.lattice_mm, unit, 3));
-  }
-  if (r.by_runs) {
-    text +=
-        "runs of the file, such as scan lines, are off together: smoothness predicts whole runs\n";
   }
   if (SharesErrors(r)) {
     text +=

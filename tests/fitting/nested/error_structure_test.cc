@@ -131,15 +131,10 @@ TEST(ErrorStructure, RunsAreThoseOfTheFile) {
   EXPECT_EQ(FindFileRuns(shuffled.Nested()).count, 0u);
 }
 
-// Lines that drift are noise and no detail; lines without drift are fitted as before.
-TEST(ErrorStructure, LinesThatDriftAreNotFollowed) {
-  const NestedFitResult drifting = ScanLines(0.05).Fit(), steady = ScanLines(0).Fit();
-  EXPECT_TRUE(drifting.report.by_runs);
-  EXPECT_LT(ErrorOf(drifting.surface), 0.03);
-  EXPECT_LT(drifting.report.effective_share, 0.1);
-  EXPECT_FALSE(steady.report.by_runs);
-  EXPECT_LT(ErrorOf(steady.surface), 0.002);
-  EXPECT_GT(steady.report.effective_share, 0.7);
+// Lines that drift tell less than as many independent points.
+TEST(ErrorStructure, LinesThatDriftCountAsFewPoints) {
+  EXPECT_LT(ScanLines(0.05).Fit().report.effective_share, 0.1);
+  EXPECT_GT(ScanLines(0).Fit().report.effective_share, 0.7);
 }
 
 // The design effect of blocks that share a part of their error, by its definition.
