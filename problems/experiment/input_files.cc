@@ -277,13 +277,13 @@ CheckFindings InputCheck::CheckCase(const Experiment& experiment) {
     const auto subject = loaded_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
       return LoadSubject(experiment.subject, context_);
     });
-    if (!IsPhantom(experiment)) {
-      found.warnings = CheckSubject(*subject, experiment.landmarks);
-    }
     const Case made = MakeCase(*subject, experiment);
     CheckFaceOptions(experiment, made);
-    for (const std::string& note : ExplainUnusedRules(experiment, made, loaded_, context_)) {
-      AddNew(note, found.warnings);
+    for (const TextLines& notes :
+         {made.notes, ExplainUnusedRules(experiment, made, loaded_, context_)}) {
+      for (const std::string& note : notes) {
+        AddNew(note, found.warnings);
+      }
     }
   });
 }

@@ -579,7 +579,10 @@ def fit_form(points, draw):
     single = lambda r: with_place(r, [struct.unpack("f", struct.pack("f", c))[0] for c in r[:3]])
     stray = lambda: with_place(rows[0], [30 + 60 * far * draw.choice([-1, 1]), 30 + 60 * far * draw.uniform(-1, 1), 60 * far * draw.uniform(-1, 1)])
     stay, mirror = lambda p: p, lambda p: (60 - p[0], p[1], p[2])
+    heights = [] if points.has_uv else [  # the unit of z has no effect on heights over x and y
+        lambda: (f"z times {factor:.3g}", [with_place(r, (r[0], r[1], factor * r[2])) for r in rows], lambda p: (p[0], p[1], p[2] / factor))]
     return draw.choice([
+        *heights,
         lambda: ("permuted", draw.sample(rows, count), stay),
         lambda: ("mirrored", [with_place(r, mirror(r)) for r in rows], mirror),
         lambda: ("u and v exchanged", [(*r[:3], r[4], r[3]) for r in rows], stay),
@@ -619,7 +622,6 @@ def fit_mistakes(world):
             lambda: ("(u,v) all the same", points.csv([(*r[:3], 0.5, 0.5) for r in rows])),
             lambda: ("two sheets over the same (u,v)", points.csv(rows + [with_place(r, (r[0], r[1], r[2] + 50)) for r in rows])),
             lambda: (f"{share:.0%} of the points anywhere", plain.csv([with_place(r, anywhere()) if n in lost else r for n, r in enumerate(rows)])),
-            lambda: ("z in another unit", plain.csv([with_place(r, (r[0], r[1], 1000 * r[2])) for r in rows])),
             lambda: ("some NaN", plain.csv([with_place(r, (math.nan, r[1], r[2])) if n in lost else r for n, r in enumerate(rows)])),
             lambda: ("rows of zeros", plain.csv([with_place(r, (0.0, 0.0, 0.0)) if n in lost else r for n, r in enumerate(rows)])),
             lambda: ("decimal commas", data.replace(b",", b";").replace(b".", b",")),
