@@ -256,7 +256,8 @@ void FaceJob::Judge() {
                       .dowels = subject_.dowels_on_bone,
                       .pose = subject_.basis.sites,
                       .target = made_->fitted.target,
-                      .fit = made_->fitted.fit},
+                      .fit = made_->fitted.fit,
+                      .is_person = !std::holds_alternative<PhantomOptions>(experiment_.subject)},
                      experiment_.plausibility, context_);
   });
 }

@@ -554,9 +554,11 @@ class Judge {
 
   void JudgeDepths() {
     const std::vector<ComparedDepth> compared = CompareWithTable(in_.dowels);
-    if (compared.empty()) {
-      Skip("depth_sds", "no depth marker lies at a site of the T-Table 2023");
-      Skip("depth_factor", "no depth marker lies at a site of the T-Table 2023");
+    if (compared.empty() || !in_.is_person) {
+      const std::string why = in_.is_person ? "no depth marker lies at a site of the T-Table 2023"
+                                            : "a phantom's depths are not those of people";
+      Skip("depth_sds", why);
+      Skip("depth_factor", why);
       return;
     }
     const ComparedDepth& worst = *std::ranges::max_element(compared, {}, &ComparedDepth::Sds);

@@ -163,6 +163,7 @@ struct FaceToJudge {
   const std::optional<SkullSites>& pose;
   const FitTarget& target;
   const FitResult& fit;
+  bool is_person = true;  // the depths of a phantom are not compared with those of people
 };
 
 // Judges a face. A check without anything to judge passes, for example the depths if no marker is

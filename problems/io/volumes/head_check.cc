@@ -162,6 +162,24 @@ std::string SuggestThresholds(const GreyLevels& levels) {
              : "";
 }
 
+// Notes bone whose brightest values have wrapped around to large negative ones, as 12 bits do above
+// their limit. Air beside bone is not that low.
+void NoteWrappedValues(const CtVolume& volume, double bone_hu, std::vector<std::string>& notes) {
+  constexpr double kWrapped = -1500, kMinShare = 0.01;  // of the neighbours of bone along a row
+  std::int64_t wrapped = 0, all = 0;
+  for (std::size_t n = 1; n < volume.values.size(); ++n) {
+    const auto [low, high] = std::minmax(volume.values[n - 1], volume.values[n]);
+    all += high > bone_hu ? 1 : 0;
+    wrapped += high > bone_hu && low < kWrapped ? 1 : 0;
+  }
+  if (static_cast<double>(wrapped) > kMinShare * static_cast<double>(all)) {
+    notes.push_back(fmt::format(
+        "{} voxels below {:.0f} HU lie beside bone: its brightest values may have wrapped around, "
+        "and dense bone is then lost; export the volume again with 16 bits",
+        wrapped, kWrapped));
+  }
+}
+
 }  // namespace
 
 GreyLevels FindGreyLevels(const CtVolume& volume) {
@@ -187,6 +205,7 @@ GreyLevels FindGreyLevels(const CtVolume& volume) {
 
 void CheckHounsfieldUnits(const CtVolume& volume, double skin_hu, double bone_hu,
                           std::vector<std::string>& notes) {
+  NoteWrappedValues(volume, bone_hu, notes);
   const GreyLevels levels = FindGreyLevels(volume);
   if (IsHead(levels) || std::isnan(levels.tissue)) {
     return;  // a head, or nothing to compare
@@ -320,8 +339,8 @@ void CheckHeadExtent(const CtVolume& volume, const HeadMask& mask, const TriMesh
                         FindContact(volume, mask.head, axis, true).cm2 > kCut_cm2;
     CheckSize(kHeadSizes[axis], sizes[axis], is_cut, volume.spacing_mm[axis], notes);
   }
-  // The breadth of a living head is two thirds to nine tenths of its length.
-  constexpr double kNarrow = 0.5, kBroad = 1.3;
+  // The breadth of a living head is two thirds to all of its length, nose and ears included.
+  constexpr double kNarrow = 0.5, kBroad = 1.05;
   const double ratio = sizes[0] / sizes[1];
   if (ratio < kNarrow || ratio > kBroad) {
     notes.push_back(fmt::format(

@@ -30,6 +30,7 @@
 #include "surfaces/base/error.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/base/lower_case.h"
+#include "surfaces/mesh_files/text_lines.h"
 
 namespace semblance::problems {
 namespace {
@@ -395,6 +396,27 @@ void CheckOffsets(std::span<const std::int16_t> values, std::span<const std::str
   }
 }
 
+// Notes neighbours with the same values, unless these are all one value, as in the air above a
+// head.
+void NoteEqualSlices(std::span<const std::int16_t> values, std::span<const std::string> names,
+                     std::vector<std::string>& notes) {
+  const std::size_t size = values.size() / names.size();
+  std::vector<std::string> equal;
+  for (std::size_t k = 0; k + 1 < names.size(); ++k) {
+    const auto slice = values.subspan(k * size, size), next = values.subspan((k + 1) * size, size);
+    if (std::ranges::equal(slice, next) &&
+        std::ranges::count(slice, slice[0]) < std::ssize(slice)) {
+      equal.push_back(fmt::format("{} and {}", names[k], names[k + 1]));
+    }
+  }
+  if (!equal.empty()) {
+    notes.push_back(fmt::format(
+        "neighbouring slices have the same values: {}{}; one of each pair may be a copy in the "
+        "place of a lost slice",
+        equal[0], equal.size() > 1 ? fmt::format(" and {} more pairs", equal.size() - 1) : ""));
+  }
+}
+
 // Reads the scanned slices of the stack in its order, and makes those of the stack.
 void ReadSlices(const DicomSeries& series, const SliceStack& stack, const std::string& where,
                 const RunContext& context, VoxelArray& array) {
@@ -410,6 +432,7 @@ void ReadSlices(const DicomSeries& series, const SliceStack& stack, const std::s
   }
   VoxelArray read = ReadSlicesInChild(slices, context.stop_token);
   CheckOffsets(read.values, names, where);
+  NoteEqualSlices(read.values, names, array.notes);
   array.clipped = read.clipped;
   array.not_finite = read.not_finite;
   array.values = MakeSlices(stack, std::move(read.values));
@@ -485,6 +508,12 @@ VolumeReading ReadDicomFolder(const fs::path& folder, const ReadVolumeOptions& o
   VolumeReading reading;
   const std::vector<DicomSeries> all = GroupSeries(headers, reading.notes);
   if (all.empty()) {
+    const auto faulty = std::ranges::find_if(
+        headers, [](const DicomHeader& header) { return !header.fault.empty(); });
+    if (faulty != headers.end()) {
+      reading.notes.push_back(
+          fmt::format("{}: {}", Shown(faulty->file.filename().string()), faulty->fault));
+    }
     throw InputError(fmt::format("{}: no file of {} is a slice with a place in space{}{}", where,
                                  headers.size(), reading.notes.empty() ? "" : ": ",
                                  fmt::join(reading.notes, "; ")));
@@ -514,6 +543,7 @@ VolumeReading ReadFile(const fs::path& path, const RunContext& context) {
     names.push_back(fmt::format("slice {}", slice));
   }
   CheckOffsets(array.values, names, where);
+  NoteEqualSlices(array.values, names, array.notes);
   return Finish(std::move(array), {}, where);
 }
 

@@ -345,14 +345,64 @@ void CheckByteOrder(const HeaderLines& lines, const std::string& where) {
   }
 }
 
+// The library skips HeaderSize bytes from the beginning of the file also where the voxels follow
+// the header, and reads nothing of compressed voxels without their size.
+void CheckMetaImageData(const HeaderLines& lines, const std::string& where) {
+  const double skipped = ParseNumber(HeaderValue(lines, "HeaderSize")).value_or(0);
+  if (skipped > 0 && HeaderValue(lines, "ElementDataFile") == "LOCAL") {
+    throw InputError(fmt::format(
+        "{}: its header has HeaderSize = {} beside ElementDataFile = LOCAL, so the voxels would "
+        "begin within the header; remove HeaderSize",
+        where, skipped));
+  }
+  if (IsTrue(HeaderValue(lines, "CompressedData")) && !lines.contains("CompressedDataSize")) {
+    throw InputError(fmt::format(
+        "{}: its voxels are compressed, and its header lacks CompressedDataSize; add the number of "
+        "bytes, or save the volume without compression",
+        where));
+  }
+}
+
+enum class AxisEnd { kFirst, kLast };
+
+// The sides where the axes of a matrix begin, or end, such as RAI and LPS for the frame LPS.
+std::string AxisLetters(const std::string& matrix, AxisEnd named) {
+  constexpr std::array<std::string_view, 3> kBegin = {"RL", "AP", "IS"};  // of +x, -x and so on
+  std::istringstream words(matrix);
+  std::string letters;
+  for (Vec3 axis; words >> axis.x() >> axis.y() >> axis.z();) {
+    int main = 0;
+    axis.cwiseAbs().maxCoeff(&main);
+    letters += kBegin[main][(axis[main] < 0) != (named == AxisEnd::kLast) ? 1 : 0];
+  }
+  return letters;
+}
+
+// Notes letters that fit the matrix in neither of their two meanings.
+void NoteContradictingLetters(const HeaderLines& lines, const std::string& matrix,
+                              HeaderPlace& place) {
+  const std::string letters = HeaderValue(lines, "AnatomicalOrientation");
+  const std::string begin = AxisLetters(matrix, AxisEnd::kFirst),
+                    end = AxisLetters(matrix, AxisEnd::kLast);
+  if (letters.size() == 3 && letters.find('?') == letters.npos && letters != begin &&
+      letters != end) {
+    place.notes.push_back(fmt::format(
+        "its AnatomicalOrientation is {}, but its TransformMatrix gives {}; the matrix is used: "
+        "check where the front and the left side of the head are",
+        Shown(letters), begin));
+  }
+}
+
 // Notes a header without a matrix. AnatomicalOrientation cannot replace it, because programs
 // disagree whether its letters name the side where an axis begins or ends; "RAI" and "LPS" mean the
 // frame LPS in one of the two ways, and its direction is what a file without a matrix is taken as.
 void CheckMetaImageOrientation(const HeaderLines& lines, const std::string& where,
                                HeaderPlace& place) {
-  if (lines.contains("TransformMatrix") || lines.contains("Rotation") ||
-      lines.contains("Orientation")) {
-    return;
+  for (const char* const matrix : {"TransformMatrix", "Rotation", "Orientation"}) {
+    if (lines.contains(matrix)) {
+      NoteContradictingLetters(lines, HeaderValue(lines, matrix), place);
+      return;
+    }
   }
   const std::string letters = HeaderValue(lines, "AnatomicalOrientation");
   if (!letters.empty() && letters != "RAI" && letters != "LPS" && !letters.starts_with('?')) {
@@ -414,6 +464,7 @@ HeaderPlace ParseMetaImagePlace(std::string_view head, const std::string& where)
                     place.slope, place.intercept));
   }
   CheckByteOrder(lines, where);
+  CheckMetaImageData(lines, where);
   CheckMetaImageOrientation(lines, where, place);
   return place;
 }

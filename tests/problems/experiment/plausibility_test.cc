@@ -233,14 +233,14 @@ const std::vector<Mistake>& Mistakes() {
 // ---------------------------------------------------------------------------------------------
 
 TEST(Plausibility, ACorrectFacePassesAndEachCheckWasJudged) {
-  const RunResult& run = GoodRun();
-  EXPECT_THAT(run.plausibility.Faults(), IsEmpty());
-  for (const PlausibilityCheck& check : run.plausibility.checks) {
+  EXPECT_THAT(GoodRun().plausibility.Faults(), IsEmpty());
+  const Plausibility judged = GoodExample().Judge();
+  EXPECT_THAT(judged.Faults(), IsEmpty());
+  for (const PlausibilityCheck& check : judged.checks) {
     EXPECT_TRUE(check.passed) << check.name;
     EXPECT_TRUE(std::isfinite(check.value)) << check.name << ": " << check.sentence;
     EXPECT_LE(check.value, check.limit) << check.name;
   }
-  EXPECT_THAT(GoodExample().Judge().Faults(), IsEmpty());
 }
 
 TEST(Plausibility, AFaceThatWasNotJudgedIsNotUsable) {

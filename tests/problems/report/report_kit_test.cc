@@ -84,8 +84,9 @@ TEST(Html, NeedsNothingElse) {
 
 TEST(Html, LegendsShowColoursAndTicks) {
   Report report = Full();
-  report.main_images[0].legends = {{DivergingMap(8), "error & sign"},
-                                   {SequentialMap(0, 1), "depth", /*shows_no_data=*/false}};
+  report.main_images[0].legends = {
+      {.map = DivergingMap(8), .title = "error & sign"},
+      {.map = SequentialMap(0, 1), .title = "depth", .shows_no_data = false}};
   const std::string html = ReportHtml(report);
   EXPECT_THAT(html, HasSubstr("error &amp; sign (mm)"));
   EXPECT_THAT(html, HasSubstr("<span>\u22128</span><span>\u22124</span><span>0</span>"

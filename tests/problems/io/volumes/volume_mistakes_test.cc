@@ -277,6 +277,25 @@ TEST_F(DicomMistakesTest, EverySecondSliceMissingIsNoted) {
   EXPECT_THAT(reading.notes, Contains(HasSubstr("numbered in steps of 2")));
 }
 
+TEST_F(DicomMistakesTest, ACopyInThePlaceOfASliceIsNoted) {
+  const auto copied = Contains(HasSubstr("neighbouring slices have the same values"));
+  WriteDicom(folder_ / "ct", array_);
+  EXPECT_THAT(Read("ct").notes, Not(copied));
+  const std::ptrdiff_t size = std::ptrdiff_t{array_.counts[0]} * array_.counts[1];
+  const auto slice = array_.values.begin() + 15 * size;
+  std::copy(slice, slice + size, slice + size);
+  WriteDicom(folder_ / "ct", array_);
+  EXPECT_THAT(Read("ct").notes, copied);
+}
+
+TEST_F(DicomMistakesTest, AFaultOfAllSlicesIsNamed) {
+  WriteDicom(folder_ / "ct", array_);
+  for (int k = 0; k < array_.counts[2]; ++k) {
+    Replace(k, "2.5\\2.5", "2.5x\\2");
+  }
+  EXPECT_THAT(Words("ct"), AllOf(HasSubstr("no file of"), HasSubstr("Pixel Spacing (0028,0030)")));
+}
+
 TEST_F(DicomMistakesTest, AnEmptyFileAmongSlicesIsRefused) {
   WriteDicom(folder_ / "ct", array_);
   WriteFileAtomically(folder_ / "ct/index.html", "");
@@ -448,12 +467,27 @@ TEST_F(MetaMistakesTest, FieldsThatTheLibraryIgnoresAreReadOrRefused) {
         std::pair("ElementSpacing = 1 1 1\nElementSpacing = 2.5 2.5 3.5\n", "twice"),
         std::pair("ElementSpacing = -2.5 2.5 3.5\n", "a.mha: "),
         std::pair("ElementSpacing = 2.5 2.5 3.5\nElementByteOrderMSB = True\n", "contradict"),
-        std::pair("ElementSpacing = 2.5 2.5 3.5\nElementNumberOfChannels = 3\n", "a.mha: ")}) {
+        std::pair("ElementSpacing = 2.5 2.5 3.5\nElementNumberOfChannels = 3\n", "a.mha: "),
+        std::pair("ElementSpacing = 2.5 2.5 3.5\nHeaderSize = 8\n", "HeaderSize = 8 beside"),
+        std::pair("ElementSpacing = 2.5 2.5 3.5\nCompressedData = True\n",
+                  "lacks CompressedDataSize")}) {
     WriteMetaImage("a.mha", Place() + lines);
     EXPECT_THAT(Words("a.mha"), HasSubstr(words)) << lines;
   }
   WriteMetaImage("a.mha", spacing + "AnatomicalOrientation = LSA\n");
   EXPECT_THAT(Words("a.mha"), HasSubstr("AnatomicalOrientation = LSA but no TransformMatrix"));
+}
+
+TEST_F(MetaMistakesTest, LettersThatContradictTheMatrixAreNoted) {
+  const auto contradicts = Contains(HasSubstr("its TransformMatrix gives RAI"));
+  for (const char* const letters : {"RAI", "LPS", "???"}) {  // both conventions, and unknown
+    WriteMetaImage("a.mha", fmt::format("{}ElementSpacing = 2.5 2.5 3.5\nAnatomicalOrientation = "
+                                        "{}\n",
+                                        Place(), letters));
+    EXPECT_THAT(Read("a.mha").notes, Not(contradicts)) << letters;
+  }
+  WriteMetaImage("a.mha", Place() + "ElementSpacing = 2.5 2.5 3.5\nAnatomicalOrientation = LPI\n");
+  EXPECT_THAT(Read("a.mha").notes, contradicts);
 }
 
 TEST_F(MetaMistakesTest, TheSlopeOfTheValuesIsApplied) {
@@ -497,6 +531,17 @@ TEST_F(VolumeValuesTest, AShiftOrFactorOfTheValuesIsNamed) {
                 HasSubstr(fmt::format("the values look scaled by {:.3g}", slope)));
     EXPECT_THAT(WordsFor(Mapped(slope, 1000 * slope - 1000)), HasSubstr("look scaled by"));
   }
+}
+
+// Values above 600 HU in 12 bits with an offset of 1024 and a limit of 1624.
+TEST_F(VolumeValuesTest, BoneThatHasWrappedAroundIsNoted) {
+  const auto wrapped = Contains(HasSubstr("may have wrapped around"));
+  EXPECT_THAT(ImportCt(head_.volume, {}, {}).notes, Not(wrapped));
+  CtVolume volume = head_.volume;
+  for (std::int16_t& value : volume.values) {
+    value = value > 600 ? static_cast<std::int16_t>(value - 4096) : value;
+  }
+  EXPECT_THAT(ImportCt(volume, {.bone_hu = 226}, {}).notes, wrapped);
 }
 
 TEST_F(VolumeValuesTest, ThresholdsThatSuitOtherValuesAreAccepted) {
