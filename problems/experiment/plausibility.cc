@@ -559,6 +559,7 @@ class Judge {
                                             : "a phantom's depths are not those of people";
       Skip("depth_sds", why);
       Skip("depth_factor", why);
+      Skip("depth_scatter", why);
       return;
     }
     const ComparedDepth& worst = *std::ranges::max_element(compared, {}, &ComparedDepth::Sds);
@@ -575,7 +576,36 @@ class Judge {
     Set("depth_factor", {std::max(factor, 1 / factor)},
         fmt::format("the published depths are {:.3g} times these depths (median)", factor),
         UnitWords(factor));
+    JudgeScatter(factors);
   }
+
+  // Depths that do not follow the sites: rows in another order, one depth for all.
+  void JudgeScatter(std::span<const double> factors) {
+    constexpr std::size_t kFewest = 10;  // fewer scatter too much by chance
+    if (factors.size() < kFewest) {
+      Skip("depth_scatter", "fewer than ten depth markers lie at sites of the T-Table 2023");
+      return;
+    }
+    std::vector<double> logarithms;
+    for (const double factor : factors) {
+      logarithms.push_back(std::log(factor));
+    }
+    std::vector<double> sorted = logarithms;
+    const double median = UpperMedian(sorted);
+    double squares = 0;
+    for (const double logarithm : logarithms) {
+      squares += (logarithm - median) * (logarithm - median);
+    }
+    const double scatter = std::sqrt(squares / static_cast<double>(logarithms.size()));
+    Set("depth_scatter", {scatter},
+        fmt::format("the depths differ from the published ones by factors that scatter by {:.2f} "
+                    "(people: {:.2f} at most)",
+                    std::exp(scatter), std::exp(kMostScatterOfPeople)),
+        "look whether each depth stands at its own site: rows may be shifted or exchanged");
+  }
+
+  // Over 54 and 15 heads of two sources, whose depths a program measured, and three CTs.
+  static constexpr double kMostScatterOfPeople = 0.48;
 
   static constexpr int kQuadsPerPatch = 4;  // as for the face
 
@@ -602,7 +632,8 @@ std::vector<PlausibilityCheck> Plausibility::Unjudged(const PlausibilityLimits& 
           {.name = "undetermined_share", .limit = limits.undetermined_share},
           {.name = "direction_deg", .unit = "deg", .limit = limits.direction_deg},
           {.name = "depth_sds", .limit = limits.depth_sds},
-          {.name = "depth_factor", .limit = limits.depth_factor}};
+          {.name = "depth_factor", .limit = limits.depth_factor},
+          {.name = "depth_scatter", .limit = limits.depth_scatter}};
 }
 
 namespace {

@@ -59,6 +59,7 @@ const std::map<std::string_view, std::string_view>& Words() {
       {"direction_deg", "depth marker off the outward direction (degrees)"},
       {"depth_sds", "depth off the published mean (SD)"},
       {"depth_factor", "depths against published ones, factor"},
+      {"depth_scatter", "scatter of the depths against published ones"},
       {"vertices", "bone vertices"},
   };
   return kWords;

@@ -2,6 +2,8 @@
 #include "problems/subject/input_mistakes.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <Eigen/Geometry>
 
 #include <algorithm>
 #include <cmath>
@@ -491,6 +493,68 @@ double MedianDistance(const std::vector<Vec3>& points, const MeshQuery& mesh,
   return UpperMedian(mm);
 }
 
+// The similarity that brings points nearest to a mesh, from where they are: iterated closest points
+// (Besl and McKay 1992), of which the farther half does not count.
+Similarity FindSimilarity(const std::vector<Vec3>& points, const MeshQuery& mesh) {
+  constexpr int kSteps = 60;
+  Similarity found;
+  for (int step = 0; step < kSteps; ++step) {
+    std::vector<std::pair<double, std::size_t>> order;
+    std::vector<Vec3> feet;
+    for (const Vec3& p : points) {
+      const MeshPoint foot = mesh.Closest(found * p);
+      order.emplace_back(foot.distance_mm, feet.size());
+      feet.push_back(foot.point);
+    }
+    std::ranges::sort(order);
+    const auto count = static_cast<Eigen::Index>((order.size() + 1) / 2);
+    Eigen::Matrix3Xd from(3, count), to(3, count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      from.col(k) = points[order[k].second];
+      to.col(k) = feet[order[k].second];
+    }
+    const Eigen::Matrix4d moved = Eigen::umeyama(from, to, /*with_scaling=*/true);
+    found.scale = std::cbrt(moved.topLeftCorner<3, 3>().determinant());
+    found.rotation = moved.topLeftCorner<3, 3>() / found.scale;
+    found.translation = moved.topRightCorner<3, 1>();
+  }
+  return found;
+}
+
+// "scaled by 1.11", "moved by (0, 10, 0) mm", whatever moves the points by more than a millimetre.
+std::string DescribeSimilarity(const Similarity& found, const Vec3& middle, double radius_mm) {
+  std::vector<std::string> words;
+  if (std::abs(found.scale - 1) * radius_mm > 1) {
+    words.push_back(fmt::format("scaled by {:.3g}", found.scale));
+  }
+  if (const double angle = Eigen::AngleAxisd(found.rotation).angle(); angle * radius_mm > 1) {
+    words.push_back(fmt::format("turned by {:.0f} degrees", angle * 180 / std::numbers::pi));
+  }
+  if (const Vec3 shift = found * middle - middle; shift.norm() > 1) {
+    words.push_back(
+        fmt::format("moved by ({:.0f}, {:.0f}, {:.0f}) mm", shift.x(), shift.y(), shift.z()));
+  }
+  return fmt::format("{}", fmt::join(words, " and "));
+}
+
+// Notes a face that another size or place would bring far nearer to the truth.
+void NoteSimilarity(const TriMesh& face, const std::vector<Vec3>& points, const MeshQuery& truth,
+                    double as_is_mm, const std::string& where, InputMistakes& found) {
+  constexpr double kMuchNearer = 3, kLeastScale = 0.5, kMostScale = 2;
+  const Similarity best = FindSimilarity(points, truth);
+  const double best_mm = MedianDistance(
+      points, truth, {.linear = best.scale * best.rotation, .shift = best.translation});
+  const std::string words =
+      DescribeSimilarity(best, Bounds(face).center(), 0.5 * Bounds(face).diagonal().norm());
+  if (best_mm * kMuchNearer < as_is_mm && best.scale > kLeastScale && best.scale < kMostScale &&
+      !words.empty()) {
+    found.notes.push_back(
+        fmt::format("{}; {} it would lie {:.1f} mm from it: check that both are of one head, in "
+                    "one frame and unit",
+                    where, words, best_mm));
+  }
+}
+
 }  // namespace
 
 std::vector<FrameChange> ForgottenChanges(const Vec3& middle) {
@@ -547,28 +611,38 @@ std::optional<FoundChange> FindForgottenChange(
 InputMistakes FindSkinMistakes(const SkinInputs& inputs) { return SkinSearch(inputs).Run(); }
 
 InputMistakes FindFaceMistakes(const TriMesh& face, const TriMesh& truth) {
-  constexpr double kFar_mm = 8, kNear_mm = 4;
+  constexpr double kSame_mm = 1e-4, kOff_mm = 3, kFar_mm = 8, kNear_mm = 4;
   const MeshQuery query(truth);
   const std::vector<Vec3> points = SomePoints(face);
   // Either may be a part of the other.
   const double as_is_mm = std::min(MedianDistance(points, query, {}),
                                    MedianDistance(SomePoints(truth), MeshQuery(face), {}));
   InputMistakes found;
+  const std::string where =
+      fmt::format("the face lies {:.1f} mm (median) from the true skin", as_is_mm);
+  if (as_is_mm < kSame_mm) {
+    found.notes.emplace_back(
+        "the face is the same surface as the true skin: the same file may be named twice");
+  }
+  if (as_is_mm > kOff_mm && !(as_is_mm > kFar_mm)) {
+    NoteSimilarity(face, points, query, as_is_mm, where, found);
+  }
   if (!(as_is_mm > kFar_mm)) {
     return found;
   }
   const auto change =
       FindForgottenChange(points, query, Bounds(truth).center(), std::min(kNear_mm, as_is_mm / 4),
                           [](const FrameChange&) { return true; });
-  const std::string where =
-      fmt::format("the face lies {:.1f} mm (median) from the true skin", as_is_mm);
   if (change) {
     found.errors.push_back(fmt::format("{}; {} it lies {:.1f} mm from it: bring both into one {}",
                                        where, change->change.what, change->median_mm,
                                        change->change.mirrored      ? "orientation"
                                        : change->change.factor != 1 ? "unit and frame"
                                                                     : "frame (LPS)"));
-  } else {
+    return found;
+  }
+  NoteSimilarity(face, points, query, as_is_mm, where, found);
+  if (found.notes.empty()) {
     found.notes.push_back(where + "; check that both are of one head, in one frame and unit");
   }
   return found;

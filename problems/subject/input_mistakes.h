@@ -93,7 +93,8 @@ InputMistakes FindSkinMistakes(const SkinInputs& inputs);
 // ---------------------------------------------------------------------------------------------
 
 // Checks whether a face and the true skin lie on each other, as `evaluate` needs. An error if only
-// a forgotten conversion brings them together; a note if they are far apart.
+// a forgotten conversion brings them together; a note if they are far apart, with the scale, turn
+// and shift that would help, and a note if they are one surface.
 InputMistakes FindFaceMistakes(const TriMesh& face, const TriMesh& truth);
 
 }  // namespace semblance::problems

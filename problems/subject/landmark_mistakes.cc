@@ -60,7 +60,9 @@ class MistakeSearch {
     if (!(fit_ && (HasAnotherFrame() || IsNoSkull() || HasOpenMandible()))) {
       if (fit_) {
         FindSitesFarOff();
+        NoteProportions();
       }
+      NoteOffset();
       if (!MandibleIsMissing()) {
         FindSitesInTheAir();
       }
@@ -282,6 +284,69 @@ class MistakeSearch {
             "(max_distance_mm); correct its point",
             DescribeSite(sites_[k].site), air_mm_[k], options_.max_distance_mm);
       }
+    }
+  }
+
+  // The extents of the sites along the axes of the average skull, in parts of the average ones.
+  // Each is the slope of the sites' coordinates over the average ones.
+  Vec3 Proportions() const {
+    const SiteBox mean = MeanSites();
+    Vec3 product = Vec3::Zero(), square = Vec3::Zero();
+    for (const SitePoint& s : standard_) {
+      const Vec3 own = InAverage(s.point) - mean.own, average = AverageSite(s.site) - mean.average;
+      product += own.cwiseProduct(average);
+      square += average.cwiseAbs2();
+    }
+    return product.cwiseQuotient(square.cwiseMax(1e-9));
+  }
+
+  struct SiteBox {
+    Vec3 own = Vec3::Zero(), average = Vec3::Zero();
+  };
+  SiteBox MeanSites() const {
+    SiteBox mean;
+    for (const SitePoint& s : standard_) {
+      mean.own += InAverage(s.point) / static_cast<double>(standard_.size());
+      mean.average += AverageSite(s.site) / static_cast<double>(standard_.size());
+    }
+    return mean;
+  }
+
+  Vec3 InAverage(const Vec3& point) const {
+    const Similarity& pose = fit_->skull_from_average;
+    return pose.rotation.transpose() * (point - pose.translation) / pose.scale;
+  }
+
+  // A wrong spacing of voxels stretches a head along one axis. The ratio of two axes is below 1.17
+  // for 99 % of the heads that the modes of the mean skull (configs/mean_skull) describe, and above
+  // 1.2 for nine in ten of these stretched by a quarter.
+  void NoteProportions() {
+    constexpr double kMostRatio = 1.2;
+    constexpr std::size_t kFewest = 12;  // sites on all sides
+    if (standard_.size() < kFewest) {
+      return;
+    }
+    const Vec3 extents = Proportions();
+    int least = 0, most = 0;
+    const double ratio = extents.maxCoeff(&most) / extents.minCoeff(&least);
+    if (ratio > kMostRatio) {
+      static constexpr std::array kNames = {"wide", "long from front to back", "high"};
+      found_.notes.push_back(fmt::format(
+          "{}: compared with an average skull it is {:.2f} times as {} as it is {}, and people "
+          "differ by at most about {}: check the spacing of the voxels along both directions",
+          label_, ratio, kNames[most], kNames[least], kMostRatio));
+    }
+  }
+
+  // Points that a person or a program lays on the bone lie on it. A common offset is a shift.
+  void NoteOffset() {
+    constexpr double kMost_mm = 1;  // of the three skulls and the phantoms: at most 0.5
+    std::vector<double> air_mm = air_mm_;
+    if (const double median_mm = air_mm.empty() ? 0 : UpperMedian(air_mm); median_mm > kMost_mm) {
+      found_.notes.push_back(fmt::format(
+          "{}: half of the sites lie {:.1f} mm or more off the bone; check that the landmarks were "
+          "placed on this surface, in its frame",
+          label_, median_mm));
     }
   }
 

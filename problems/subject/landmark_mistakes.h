@@ -31,6 +31,8 @@ double SamePoint_mm(const Box3& extent);
 //   mandible        All sites of the mandible are in the air. Only a note if none is given, none is
 //                   listed as absent and no bone is near.
 //   in the air      A site is farther than max_distance_mm from the bone.
+//   proportions     A note: the skull is stretched along one axis.
+//   offset          A note: half of the sites lie more than 1 mm off the bone.
 // With fewer than six standard sites only `same point` and `in the air` are checked.
 InputMistakes FindLandmarkMistakes(const LandmarkFile& file, const TriMesh& skull,
                                    const MeshQuery& query, const PlaceOptions& options);

@@ -96,6 +96,50 @@ double DoubledShare(const TriMesh& mesh, const MeshQuery& query) {
   return samples > 0 ? static_cast<double>(doubled) / samples : 0;
 }
 
+// A connected part of a mesh.
+struct Piece {
+  std::int64_t triangles = 0;
+  double area_mm2 = 0;
+  Box3 box;
+};
+
+// The pieces with at least a tenth of the triangles, by their number of triangles.
+std::vector<Piece> LargePieces(const TriMesh& mesh) {
+  const Components components = ConnectedComponents(mesh);
+  std::vector<Piece> pieces(components.count);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    Piece& piece = pieces[components.of_triangle[t]];
+    ++piece.triangles;
+    piece.area_mm2 += TriangleAreaVector(mesh, mesh.triangles[t]).norm();
+    for (const std::int32_t corner : mesh.triangles[t]) {
+      piece.box.extend(mesh.points[corner]);
+    }
+  }
+  std::erase_if(pieces, [&](const Piece& piece) {
+    return 10 * piece.triangles < std::ssize(mesh.triangles);
+  });
+  std::ranges::stable_sort(pieces, {}, &Piece::triangles);
+  return pieces;
+}
+
+// Notes two pieces that are the same but for a shift, as two registrations of one scan.
+void NoteMovedCopies(const TriMesh& mesh, const std::string& name,
+                     std::vector<std::string>& notes) {
+  constexpr double kSame = 1e-4;  // relative; single precision and a shift round areas by less
+  const std::vector<Piece> pieces = LargePieces(mesh);
+  for (std::size_t k = 1; k < pieces.size(); ++k) {
+    const Piece &a = pieces[k - 1], &b = pieces[k];
+    const Vec3 shift = b.box.center() - a.box.center();
+    if (a.triangles == b.triangles && std::abs(a.area_mm2 - b.area_mm2) < kSame * a.area_mm2 &&
+        (a.box.sizes() - b.box.sizes()).norm() < kSame * a.box.diagonal().norm()) {
+      notes.push_back(fmt::format(
+          "{}: it holds two copies of one surface of {} triangles, {:.1f} mm apart; keep one of "
+          "them",
+          name, a.triangles, shift.norm()));
+    }
+  }
+}
+
 }  // namespace
 
 void CheckHeadSize(double longest_mm, const std::string& name, const std::string& remedy) {
@@ -136,6 +180,7 @@ std::vector<std::string> CheckHeadMesh(const TriMesh& mesh, const std::string& n
         "if it held two versions of one surface; keep one of them, or a face may lie too far out",
         name, 100 * doubled));
   }
+  NoteMovedCopies(mesh, name, notes);
   note(edges.boundary, "are open borders");
   note(edges.non_manifold, "are non-manifold");
   note(edges.inconsistent, "join triangles of opposite orientation");

@@ -223,6 +223,25 @@ const std::vector<Mistake>& Mistakes() {
       {"DepthsInInches", "depth_factor", [](Example& c) { ScaleDepths(c, 1 / 25.4); }, false},
       {"DepthsInMetres", "depth_factor", [](Example& c) { ScaleDepths(c, 0.001); }, false},
       {"DepthsTenTimesTooLarge", "depth_factor", [](Example& c) { ScaleDepths(c, 10); }, false},
+      {"DepthsOfOtherRows", "depth_scatter",
+       [](Example& c) {
+         std::vector<double> depths;
+         for (const Dowel& dowel : c.dowels) {
+           depths.push_back(dowel.depth_mm);
+         }
+         std::ranges::rotate(depths, depths.begin() + 5);
+         for (std::size_t k = 0; k < depths.size(); ++k) {
+           c.dowels[k].depth_mm = depths[k];
+         }
+       },
+       false},
+      {"OneDepthForAll", "depth_scatter",
+       [](Example& c) {
+         for (Dowel& dowel : c.dowels) {
+           dowel.depth_mm = 9;
+         }
+       },
+       false},
       {"OneDepthOfAnotherSite", "depth_sds",
        [](Example& c) { std::ranges::find(c.dowels, "g", &Dowel::site)->depth_mm = 25; }}};
   return mistakes;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/subject/input_mistakes.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -118,11 +119,27 @@ TEST(SkinMistakes, RealHeadsHaveNone) {
 
 TEST(FaceMistakes, OnlyForgottenConversionsAreErrors) {
   const TriMesh truth = PhantomHead(1).skin;
-  EXPECT_THAT(FindFaceMistakes(truth, truth).notes, IsEmpty());
+  EXPECT_THAT(FindFaceMistakes(truth, truth).notes,
+              ::testing::ElementsAre(HasSubstr("the face is the same surface as the true skin")));
   EXPECT_THAT(FindFaceMistakes(PhantomHead(2).skin, truth).notes, IsEmpty());
   const TriMesh ras = Moved(truth, [](const Vec3& p) { return Vec3(-p.x(), -p.y(), p.z()); });
   EXPECT_THAT(FindFaceMistakes(ras, truth).errors,
               ::testing::ElementsAre(HasSubstr("x and y negated it lies 0.0 mm from it")));
+}
+
+// A face of another size, or beside the truth, is noted with the change that would help.
+TEST(FaceMistakes, AnotherSizeOrPlaceIsNamed) {
+  const TriMesh truth = PhantomHead(1).skin;
+  const Vec3 middle = Bounds(truth).center();
+  for (const double factor : {0.9, 1.1}) {
+    const TriMesh scaled =
+        Moved(truth, [&](const Vec3& p) { return Vec3(middle + factor * (p - middle)); });
+    EXPECT_THAT(FindFaceMistakes(scaled, truth).notes,
+                ::testing::Contains(HasSubstr(fmt::format("scaled by {:.2f}", 1 / factor))));
+  }
+  const TriMesh shifted = Moved(truth, [](const Vec3& p) { return Vec3(p + Vec3(0, -10, 0)); });
+  EXPECT_THAT(FindFaceMistakes(shifted, truth).notes,
+              ::testing::Contains(HasSubstr("moved by (0, 10, ")));
 }
 
 }  // namespace

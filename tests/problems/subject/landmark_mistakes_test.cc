@@ -224,6 +224,37 @@ void OpenMouth(Subject& s, double opening_deg) {
   }
 }
 
+// A head of voxels whose spacing was wrong along one axis.
+TEST(LandmarkMistakes, AStretchedHeadIsNoted) {
+  for (const Subject& sound : Sound()) {
+    for (int axis = 0; axis < 3; ++axis) {
+      for (const double factor : {0.7, 1.4}) {
+        Subject s = sound;
+        const auto stretch = [&](Vec3 p) {
+          p[axis] *= factor;
+          return p;
+        };
+        MoveSites(s, stretch);
+        MoveSkull(s, stretch);
+        const InputMistakes mistakes = Find(s);
+        const bool is_noted = std::ranges::any_of(mistakes.notes, [](const std::string& note) {
+          return note.find("check the spacing of the voxels") != note.npos;
+        });
+        EXPECT_TRUE(is_noted || !mistakes.errors.empty())
+            << sound.file.subject << " " << axis << " " << factor;
+      }
+    }
+  }
+}
+
+TEST(LandmarkMistakes, SitesThatAreAllOffTheBoneAreNoted) {
+  Subject s = PhantomSubject();
+  const Vec3 middle = Bounds(s.skull).center();
+  MoveSites(s, [&](const Vec3& p) { return Vec3(p + 2 * (middle - p).normalized()); });
+  EXPECT_THAT(Find(s).errors, IsEmpty());
+  EXPECT_THAT(Find(s).notes, ElementsAre(HasSubstr("half of the sites lie ")));
+}
+
 TEST(LandmarkMistakes, AnOpenMandibleIsReportedOnceWithItsAngle) {
   for (Subject subject : {RealSubject("cthead"), RealSubject("vhm")}) {
     OpenMouth(subject, 30);

@@ -4,7 +4,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <string>
+#include <vector>
+
 #include "surfaces/base/error.h"
+#include "surfaces/mesh/mesh_primitives.h"
 #include "surfaces/mesh_files/mesh_io.h"
 #include "tests/testing/shapes.h"
 
@@ -36,6 +41,20 @@ TEST(MeshCheck, AnotherUnitIsNamed) {
               HasSubstr("it looks like centimetres; multiply by 10,"));
   EXPECT_THAT(ErrorOf(SphereMesh({0, 0, 0}, 4.5, 20)),
               HasSubstr("it looks like inches; multiply by 25.4,"));
+}
+
+TEST(MeshCheck, AMovedCopyIsNoted) {
+  const auto is_noted = [](const TriMesh& other) {
+    TriMesh both = SphereMesh({0, 0, 0}, 80, 20);
+    Append(both, other);
+    const std::vector<std::string> notes = CheckHeadMesh(both, "skull.ply");
+    return std::ranges::any_of(notes, [](const std::string& note) {
+      return note.find("two copies of one surface") != note.npos;
+    });
+  };
+  EXPECT_TRUE(is_noted(SphereMesh({2, 0, 0}, 80, 20)));
+  EXPECT_FALSE(is_noted(SphereMesh({2, 0, 0}, 79, 20)));
+  EXPECT_FALSE(is_noted(SphereMesh({2, 0, 0}, 80, 24)));
 }
 
 TEST(MeshCheck, WhatIsTooFarAwayOrHasNoAreaIsRefused) {
