@@ -70,11 +70,12 @@ bool LieAlongLines(const NestedPoints& points) {
 
 namespace {
 
+constexpr std::size_t kAlong = 4;  // points on each side of a turn; fewer turn by chance
+
 // Returns whether the way of the points turns back at the n-th, as at the end of a line that is
 // followed by the next in the other direction.
 bool TurnsBack(const NestedPoints& points, const std::vector<std::uint32_t>& order, std::size_t n) {
-  constexpr std::size_t kAlong = 4;  // points on each side; fewer turn by chance
-  constexpr double kBack = -0.7;     // cosine
+  constexpr double kBack = -0.7;  // cosine
   if (n < kAlong || n + kAlong >= order.size()) {
     return false;
   }
@@ -110,9 +111,15 @@ FileRuns FindFileRuns(const NestedPoints& points) {
   if (!(median > 0 && median < kNeighbour * points.patches.norm())) {
     return {};
   }
+  const auto is_far = [&](double step) { return !(step < kFar * median); };
   const auto ends_before = [&](std::size_t begin, std::size_t n) {
-    return !(steps[n - 1] < kFar * median) ||
-           (n - begin >= kShortest && TurnsBack(points, curve_of, n));
+    if (is_far(steps[n - 1])) {
+      return true;
+    }
+    const auto next = steps.begin() + static_cast<std::ptrdiff_t>(n);
+    const auto ahead = std::min<std::ptrdiff_t>(kAlong, steps.end() - next);
+    return n - begin >= kShortest && std::none_of(next, next + ahead, is_far) &&
+           TurnsBack(points, curve_of, n);
   };
   FileRuns runs{.run = std::vector<std::uint32_t>(points.size(), FileRuns::kNone)};
   for (std::size_t begin = 0, end = 1; begin < curve_of.size(); begin = end, ++end) {

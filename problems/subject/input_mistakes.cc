@@ -504,7 +504,7 @@ Similarity FindSimilarity(const std::vector<Vec3>& points, const MeshQuery& mesh
     for (const Vec3& p : points) {
       const MeshPoint foot = mesh.Closest(found * p);
       order.emplace_back(foot.distance_mm, feet.size());
-      feet.push_back(foot.point);
+      feet.push_back(foot.position);
     }
     std::ranges::sort(order);
     const auto count = static_cast<Eigen::Index>((order.size() + 1) / 2);
@@ -543,7 +543,7 @@ void NoteSimilarity(const TriMesh& face, const std::vector<Vec3>& points, const 
   constexpr double kMuchNearer = 3, kLeastScale = 0.5, kMostScale = 2;
   const Similarity best = FindSimilarity(points, truth);
   const double best_mm = MedianDistance(
-      points, truth, {.linear = best.scale * best.rotation, .shift = best.translation});
+      points, truth, {.what = "", .linear = best.scale * best.rotation, .shift = best.translation});
   const std::string words =
       DescribeSimilarity(best, Bounds(face).center(), 0.5 * Bounds(face).diagonal().norm());
   if (best_mm * kMuchNearer < as_is_mm && best.scale > kLeastScale && best.scale < kMostScale &&
