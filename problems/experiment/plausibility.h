@@ -39,7 +39,7 @@ struct PlausibilityLimits {
   double direction_deg = 100;
   double depth_sds = 5;
   double depth_factor = 2.5;
-  double depth_scatter = 0.55;
+  double depth_scatter = 1.7;
 };
 template <class Visitor>
 void Fields(Visitor& visit, PlausibilityLimits& o) {
@@ -130,12 +130,13 @@ void Fields(Visitor& visit, PlausibilityLimits& o) {
                   .doc = "greatest median factor between the depths and the means of that table, "
                          "either way; a factor of 10 or 25.4 means another unit"},
         o.depth_factor);
-  visit(FieldInfo{.name = "depth_scatter",
-                  .min = 0,
-                  .max = 10,
-                  .doc = "greatest RMS of the logarithms of the depths over the means of that "
-                         "table, around their median; rows in another order scatter by more"},
-        o.depth_scatter);
+  visit(
+      FieldInfo{.name = "depth_scatter",
+                .min = 1,
+                .max = 1000,
+                .doc = "greatest scatter, as a factor, of these factors around their median: rows "
+                       "in another order scatter by more"},
+      o.depth_scatter);
 }
 
 struct PlausibilityCheck {

@@ -904,7 +904,9 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
       BeginResult(std::move(placed), std::move(fit), std::move(attributes), options.unit);
   CompareShapes(given, has_heights, result);
   AddAttributes(given.weights, context, step, result);
-  ScaleHeights(1 / factor, result.fit);
+  if (factor != 1) {
+    ScaleHeights(1 / factor, result.fit);
+  }
   result.height_factor = factor;
   CompareDistances(given, result);
   if (std::isfinite(result.weighted_rms_mm)) {

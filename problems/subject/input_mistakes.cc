@@ -531,8 +531,8 @@ std::string DescribeSimilarity(const Similarity& found, const Vec3& middle, doub
     words.push_back(fmt::format("turned by {:.0f} degrees", angle * 180 / std::numbers::pi));
   }
   if (const Vec3 shift = found * middle - middle; shift.norm() > 1) {
-    words.push_back(
-        fmt::format("moved by ({:.0f}, {:.0f}, {:.0f}) mm", shift.x(), shift.y(), shift.z()));
+    words.push_back(fmt::format("moved by ({}, {}, {}) mm", std::lround(shift.x()),
+                                std::lround(shift.y()), std::lround(shift.z())));
   }
   return fmt::format("{}", fmt::join(words, " and "));
 }

@@ -32,6 +32,16 @@ EmitterDepth DepthOver(const Emitter& emitter) {
 // Largest relative difference between two quadratures of a flat emitter, each within 1 %, with a
 // margin.
 constexpr double kFlatShare = 0.025;
+// The same for depths that are linear over a triangle: seen from about one edge away, their
+// second-order weights err more (found with triangles as wide as the tissue is thick).
+constexpr double kSlopedShare = 0.1;
+
+double FindSumShare(const AnyKernel& kernel, std::span<const EmitterTriangle> emitters) {
+  if (!std::holds_alternative<FlatKernel>(kernel)) {
+    return 0;
+  }
+  return std::ranges::any_of(emitters, &EmitterTriangle::IsSloped) ? kSlopedShare : kFlatShare;
+}
 
 void SetGains(const AnyKernel& kernel, std::vector<EmitterTriangle>& emitters) {
   std::visit(
@@ -88,6 +98,7 @@ struct ImplicitSurface::Impl {
         emitters(MakeEmittersWithGains(skull, depth_mm, DepthOver(options.emitter), kernel)),
         search(emitters, SearchOptions(kernel, options.tail_error)),
         neighbours(CubeSize(emitters, HasCut(kernel))),
+        sum_share(FindSumShare(kernel, emitters)),
         tail_error(options.tail_error),
         decay(std::visit([](const auto& k) { return k.Decay(); }, kernel)) {
     std::visit([this](const auto& k) { MakeLanes(k); }, kernel);
@@ -178,7 +189,7 @@ struct ImplicitSurface::Impl {
   std::vector<FlatEmitterLanes> flat_lanes;          // per eight emitters, for `flat`
   std::vector<DistanceEmitterLanes> distance_lanes;  // per eight emitters, else
   std::vector<ReachBall> reach_balls;                // per half of distance_lanes
-  double tail_error, decay;
+  double sum_share, tail_error, decay;
 };
 
 ImplicitSurface::ImplicitSurface(const TriMesh& skull, std::span<const double> depth_mm,
@@ -247,9 +258,7 @@ double ImplicitSurface::SumEmissions(const NeighbourList& gathered, const Vec3& 
   return impl_->Sum(gathered, p, evaluations);
 }
 
-double ImplicitSurface::SumShare() const {
-  return std::holds_alternative<FlatKernel>(impl_->kernel) ? kFlatShare : 0;
-}
+double ImplicitSurface::SumShare() const { return impl_->sum_share; }
 
 void ImplicitSurface::BoundsIn(const Box3& box, std::span<const std::int32_t> emitters,
                                std::span<EmissionBounds> bounds) const {

@@ -409,7 +409,8 @@ void NoteEqualSlices(std::span<const std::int16_t> values, std::span<const std::
       equal.push_back(fmt::format("{} and {}", names[k], names[k + 1]));
     }
   }
-  if (!equal.empty()) {
+  constexpr std::size_t kMostShare = 20;  // one pair in twenty
+  if (!equal.empty() && equal.size() * kMostShare <= names.size()) {
     notes.push_back(fmt::format(
         "neighbouring slices have the same values: {}{}; one of each pair may be a copy in the "
         "place of a lost slice",

@@ -347,9 +347,11 @@ void CheckByteOrder(const HeaderLines& lines, const std::string& where) {
 
 // The library skips HeaderSize bytes from the beginning of the file also where the voxels follow
 // the header, and reads nothing of compressed voxels without their size.
-void CheckMetaImageData(const HeaderLines& lines, const std::string& where) {
+void CheckMetaImageData(const HeaderLines& lines, std::string_view head, const std::string& where) {
   const double skipped = ParseNumber(HeaderValue(lines, "HeaderSize")).value_or(0);
-  if (skipped > 0 && HeaderValue(lines, "ElementDataFile") == "LOCAL") {
+  const std::size_t data = head.find("ElementDataFile");  // ends the lines
+  if (skipped > 0 && data != head.npos &&
+      head.substr(data, head.find('\n', data) - data).find("LOCAL") != head.npos) {
     throw InputError(fmt::format(
         "{}: its header has HeaderSize = {} beside ElementDataFile = LOCAL, so the voxels would "
         "begin within the header; remove HeaderSize",
@@ -464,7 +466,7 @@ HeaderPlace ParseMetaImagePlace(std::string_view head, const std::string& where)
                     place.slope, place.intercept));
   }
   CheckByteOrder(lines, where);
-  CheckMetaImageData(lines, where);
+  CheckMetaImageData(lines, head, where);
   CheckMetaImageOrientation(lines, where, place);
   return place;
 }

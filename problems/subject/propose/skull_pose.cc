@@ -209,11 +209,20 @@ double RivalMisfit_mm(const std::vector<Candidate>& candidates) {
   return std::numeric_limits<double>::infinity();
 }
 
+// The angle to the nearer one of LPS and RAS.
+double Tilt_deg(const Mat3& rotation) {
+  const double cosine = std::max((rotation.trace() - 1) / 2,
+                                 (rotation(2, 2) - rotation(0, 0) - rotation(1, 1) - 1) / 2);
+  return std::acos(std::clamp(cosine, -1.0, 1.0)) * 180 / std::numbers::pi;
+}
+
 // True if the best upright pose needs no search for a better one. Two different adult skulls fit
-// each other within 2 to 4 mm; the opposite orientation of the same two is off by twice as much.
+// each other within 2 to 4 mm; the opposite orientation of the same two is off by twice as much. A
+// pose that has turned far from where it began may still be on its way.
 bool IsPlain(const std::vector<Candidate>& upright) {
-  constexpr double kMaxMisfit_mm = 4, kMaxRivalRatio = 0.7;
+  constexpr double kMaxMisfit_mm = 4, kMaxRivalRatio = 0.7, kMaxTilt_deg = 15;
   return upright.front().misfit_mm < kMaxMisfit_mm &&
+         Tilt_deg(upright.front().pose.rotation) < kMaxTilt_deg &&
          upright.front().misfit_mm < kMaxRivalRatio * RivalMisfit_mm(upright);
 }
 

@@ -30,7 +30,7 @@ Skull BumpySkull() {
   }
   skull.mesh = Submesh(sphere, keep);
   for (Vec3& p : skull.mesh.points) {
-    skull.depth_mm.push_back(3 + std::sin(3 * p.x() + 2 * p.z()));
+    skull.depth_mm.push_back(11 + 3 * std::sin(3 * p.x() + 2 * p.z()));  // thick for coarse cells
     p *= 30 + 3 * std::cos(5 * p.y()) * std::sin(4 * p.x());
   }
   return skull;

@@ -159,7 +159,8 @@ TEST_F(ReadVolumeTest, ClaimsBeyondTheFileAreRefused) {
     WriteFileAtomically(
         folder_ / "x.mha",
         fmt::format("ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = "
-                    "False\nCompressedData = {}\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 "
+                    "False\nCompressedData = {}\nCompressedDataSize = 8\nTransformMatrix = 1 0 0 0 "
+                    "1 0 0 0 1\nOffset = 0 0 "
                     "0\nElementSpacing = {}\nDimSize = {}\nElementType = "
                     "MET_SHORT\nElementDataFile = LOCAL\nabcdefgh",
                     compressed, spacing, sizes));
