@@ -659,10 +659,9 @@ std::vector<double> CountedDistances(const FitResult& fit) {
 }
 
 // Compares shapes, in the coordinates of the fit.
-void CompareShapes(const GivenPoints& given, bool has_heights, PointFit& result) {
-  const double diagonal = given.box.diagonal().norm(), height = given.box.sizes().z();
-  result.reach =
-      ReachBeyond(result.fit.surface, given.box, has_heights && height > 0 ? height : diagonal);
+void CompareShapes(const GivenPoints& given, PointFit& result) {
+  const double diagonal = given.box.diagonal().norm();
+  result.reach = ReachBeyond(result.fit.surface, given.box, diagonal);
   result.off = given.has_uv && given.on_line
                    ? kNaN
                    : RootMeanSquare(CountedDistances(result.fit)) / diagonal;
@@ -902,7 +901,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   });
   PointFit result =
       BeginResult(std::move(placed), std::move(fit), std::move(attributes), options.unit);
-  CompareShapes(given, has_heights, result);
+  CompareShapes(given, result);
   AddAttributes(given.weights, context, step, result);
   if (factor != 1) {
     ScaleHeights(1 / factor, result.fit);

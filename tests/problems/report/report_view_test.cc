@@ -169,18 +169,19 @@ TEST_F(ReportViewTest, RendersTogglesLinksAndSortsWithoutAFault) {
   EXPECT_EQ(out["down"], nlohmann::json({"10", "9.5", "–"}));
 }
 
+// Keeps what was drawn on a canvas, so that it can be read at any time.
+constexpr const char* kKeepPictures = R"js(<script>
+const getContext = HTMLCanvasElement.prototype.getContext;
+HTMLCanvasElement.prototype.getContext = function (kind, options) {
+  return getContext.call(this, kind, {...options, preserveDrawingBuffer: true});
+};
+</script>)js";
+
 constexpr const char* kCountMarks = R"js(<script>
 addEventListener('load', () => setTimeout(() => {
   const canvas = document.querySelector('.view3d-stage canvas'), copy = document.createElement('canvas');
   Object.assign(copy, {width: canvas.width, height: canvas.height});
   const pen = copy.getContext('2d');
-  const due = [];  // a picture can be read only right after it was drawn
-  window.requestAnimationFrame = (draw) => { due.push(draw); return 0; };
-  const layer = document.querySelector('input[data-layer]');
-  for (let k = 0; k < 2; ++k) {
-    layer.click();
-    for (const draw of due.splice(0)) { draw(); }
-  }
   pen.drawImage(canvas, 0, 0);
   const data = pen.getImageData(0, 0, copy.width, copy.height).data;
   let red = 0;
@@ -189,7 +190,7 @@ addEventListener('load', () => setTimeout(() => {
                notes: [...document.querySelectorAll('.notes .fault')].map((note) => note.textContent),
                facts: document.querySelector('.view3d-facts.fault')?.textContent || ''};
   document.body.insertAdjacentHTML('beforeend', '<pre id="outcome">' + JSON.stringify(out) + '</pre>');
-}, 1000));
+}, 4000));
 </script>)js";
 
 TEST_F(ReportViewTest, MarksFaultsInRedAtTheirPlaces) {
@@ -200,7 +201,7 @@ TEST_F(ReportViewTest, MarksFaultsInRedAtTheirPlaces) {
   report.faults = run.Faults();
   report.scenes = CollectScenes({{"one", SceneJson(run, {})}}, 1 << 30).json;
   std::string html = ReportHtml(report);
-  html.insert(html.find("<head>") + 6, kListen);
+  html.insert(html.find("<head>") + 6, std::string(kListen) + kKeepPictures);
   const nlohmann::json out = Outcome(html + kCountMarks, "1400,1200");
   EXPECT_EQ(out["faults"], nlohmann::json::array());
   EXPECT_EQ(out["labels"], nlohmann::json(run.Faults()));
