@@ -3,18 +3,11 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
-
 namespace semblance::fitting {
 
 std::vector<std::string> FaultsIn(const FitResult& fit) {
   if (fit.usable) {
     return {};
-  }
-  if (!std::isfinite(fit.point_rms_mm)) {
-    return {
-        "the points' distances from the surface are not finite numbers; look for huge "
-        "coordinates and weights"};
   }
   std::vector<std::string> faults;
   for (std::size_t k = 0; k < fit.levels.size(); ++k) {
@@ -23,7 +16,13 @@ std::vector<std::string> FaultsIn(const FitResult& fit) {
                                    k + 1, fit.levels[k].level, fit.levels[k].solver));
     }
   }
-  return faults.empty() ? std::vector<std::string>{"the fit was not done"} : faults;
+  if (faults.empty()) {  // each step has a solution, but its distances do not
+    faults.emplace_back(fit.levels.empty()
+                            ? "the fit was not done"
+                            : "the points' distances from the surface are not finite numbers; look "
+                              "for huge coordinates and weights");
+  }
+  return faults;
 }
 
 }  // namespace semblance::fitting

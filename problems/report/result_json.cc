@@ -371,6 +371,9 @@ Json BoneJson(const RunResult& result) {
 }  // namespace
 
 double MarkerRms_mm(const RunResult& result) {
+  if (result.face.mesh.triangles.empty()) {
+    return kNaN;  // no run yet: a study looks at the names of the metrics only
+  }
   const MeshQuery face(result.face.mesh);
   double squares = 0;
   int count = 0;

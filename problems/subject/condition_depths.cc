@@ -45,7 +45,7 @@ std::map<std::string, double> KnownCovariates(const TissueGiven& given) {
     }
   };
   add("sex", given.sex ? std::optional(CovariateValue(*given.sex)) : std::nullopt);
-  add("build", given.build ? std::optional(CovariateValue(*given.build)) : std::nullopt);
+  add("build", given.build ? std::optional(CovariateValue(*given.build)) : given.build_sds);
   add("age_years", given.age_years);
   add("bmi", given.bmi);
   return known;

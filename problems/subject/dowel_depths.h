@@ -76,12 +76,13 @@ struct TissueGiven {
   double error_mm = 0;
   std::optional<Sex> sex;
   std::optional<Build> build;
-  std::optional<double> age_years, bmi;
+  std::optional<double> build_sds, age_years, bmi;
   std::filesystem::path spread;
   SiteCorrelation correlation;
 
   bool HasNothing() const {
-    return depths_mm.empty() && measured.empty() && !sex && !build && !age_years && !bmi;
+    return depths_mm.empty() && measured.empty() && !sex && !build && !build_sds && !age_years &&
+           !bmi;
   }
 };
 template <class Visitor>
@@ -110,6 +111,12 @@ void Fields(Visitor& visit, TissueGiven& o) {
         o.sex);
   visit(FieldInfo{.name = "build", .doc = "build as a covariate, if the table has it; see sex"},
         o.build);
+  visit(FieldInfo{.name = "build_sds",
+                  .min = -4,
+                  .max = 4,
+                  .doc = "build as a number, if the table has the covariate: standard deviations "
+                         "of its people from their mean; thin is below 0"},
+        o.build_sds);
   visit(
       FieldInfo{
           .name = "age_years", .min = 0, .max = 130, .doc = "age, if the table has the covariate"},
@@ -185,6 +192,9 @@ void CheckValue(Report& report, const TissueOptions& o) {
     report("given",
            "applies to the depths of a table; write `depths: table`, and list the measured sites "
            "to use under given.measured");
+  }
+  if (o.given.build && o.given.build_sds) {
+    report("given.build_sds", "states the build a second time; leave given.build out");
   }
 }
 

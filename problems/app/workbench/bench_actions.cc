@@ -80,7 +80,9 @@ BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& 
   landmark.normal.reset();
   if (landmark.proposed) {
     TakeOver(landmark);
-    landmark.note.clear();  // it explained the proposed point
+    if (landmark.note.starts_with("proposed")) {  // it explained the proposed point
+      landmark.note.clear();
+    }
   }
   DropAbsence(state, site);
   return state;

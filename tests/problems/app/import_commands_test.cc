@@ -40,8 +40,9 @@ TEST_F(ImportCommands, ASeriesBecomesSkullAndSkinAndTheNextCommandIsPrinted) {
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_TRUE(fs::exists(folder_ / "out/skull.ply"));
   EXPECT_TRUE(fs::exists(folder_ / "out/skin.ply"));
-  EXPECT_THAT(outcome.out, AllOf(HasSubstr("note: series 1: CT"), HasSubstr("head holder"),
-                                 HasSubstr("next: semblance workbench out/skull.ply")));
+  EXPECT_THAT(outcome.out,
+              AllOf(HasSubstr("note: series 1: CT"), HasSubstr("head holder"),
+                    HasSubstr("next: semblance workbench "), HasSubstr("out/skull.ply\n")));
 }
 
 TEST_F(ImportCommands, OnlyTheSkinOfAnMrIsImported) {
