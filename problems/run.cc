@@ -247,7 +247,8 @@ void FaceJob::MeasureFace() {
   NoteSmallTruth();
 }
 
-// Of a whole face about half of the recovered one is scored (44 to 54 % on phantoms and three CTs).
+// A whole true skin is scored over about half of the recovered face (44 to 54 % on phantoms and
+// three CTs).
 void FaceJob::NoteSmallTruth() {
   constexpr double kLeastShare = 0.15;
   const double scored_cm2 =

@@ -22,8 +22,8 @@ struct PointFile {
 //   between the entries, as in `//X Y Z R G B` of CloudCompare; without names of columns the first
 //   three are x, y and z;
 // - .xyz: x, y and z on each line, and further numbers without effect; # begins a comment; a first
-//   line may name the columns; .pts the same, after a line with the number of points; .asc the same,
-//   or an ASCII grid of ESRI;
+//   line may name the columns; .pts the same, after a line with the number of points; .asc the
+//   same, or an ASCII grid of ESRI;
 // - .npy: n x 3 (x, y, z) or n x 5 (x, y, z, u, v);
 // - .ply: properties of the vertices: x, y, z; u, v or s, t; weight or sigma; exact, with nx, ny,
 //   nz; the attributes; and the faces;

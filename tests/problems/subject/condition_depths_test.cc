@@ -203,6 +203,29 @@ TEST(ConditionDepths, UsesAPopulationsCorrelations) {
               HasSubstr("age_years"));
 }
 
+// The table of people as it is shipped: build moves each depth by its own loading, and what it
+// leaves open is less than without it.
+TEST(ConditionDepths, TheShippedPopulationFollowsBuild) {
+  TissueOptions options;
+  options.table = SEMBLANCE_SOURCE_DIR "/configs/tables/open_kbp.yaml";
+  const auto at = [&](double build_sds) {
+    options.given.build_sds = build_sds;
+    std::vector<Dowel> dowels = Dowels({"g", "zy_l", "mr_r"});
+    FillDepths(options, {}, dowels);
+    ConditionDepths(options, {}, dowels);
+    return dowels;
+  };
+  const std::vector<Dowel> thin = at(-1), mean = at(0), heavy = at(1);
+  const TissueTable table = ReadTissueTable(options.table);
+  for (std::size_t k = 0; k < mean.size(); ++k) {
+    const auto depth = FindDepth(table, Sex::kMale, Build::kNormal, mean[k].site);
+    EXPECT_NEAR(mean[k].depth_mm, depth->mean_mm, 1e-9) << mean[k].site;
+    EXPECT_NEAR(heavy[k].depth_mm - mean[k].depth_mm, mean[k].depth_mm - thin[k].depth_mm, 1e-9);
+    EXPECT_GT(heavy[k].depth_mm, mean[k].depth_mm + 0.3 * *depth->sd_mm) << mean[k].site;
+    EXPECT_LT(mean[k].sd_mm, *depth->sd_mm) << mean[k].site;
+  }
+}
+
 TEST(ConditionDepths, NotesValuesFarFromAllSubjects) {
   TissueOptions options;
   options.table = ScratchFile(kPopulation);
