@@ -13,7 +13,7 @@
 //                      | no                      | yes
 //                      |                         v
 //                      |      does --rerun ask for its status or its version, or
-//                      |      does it lack a file that `keep` asks for now?
+//                      |      does it lack a file that `keep` requests now?
 //                      |         | yes                   | no
 //                      v         v                       v
 //                    +-------------+               +-----------+
@@ -240,7 +240,7 @@ class StudyRunner {
            (trial.status == "unusable" && options_.rerun == Rerun::kUnusable);
   }
 
-  // Returns true if the trial's folder has the files that `keep` asks for now. `keep` may have
+  // Returns true if the trial's folder has the files that `keep` requests now. `keep` may have
   // asked for fewer files when the trial ran.
   bool HasKeptFiles(const StudyTrial& trial, const std::string& status) const {
     const bool is_depth = plan_.job == StudyJob::kDepth;

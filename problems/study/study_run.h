@@ -55,7 +55,7 @@ struct StudySummary {
 //
 // The study may have changed since the last call. A finished trial that is still in the plan is
 // kept (its trial.json then gets the axes of the changed study), unless it lacks files that `keep`
-// asks for now, or a file of it is damaged. A trial that is no longer in the plan stays on disk and
+// requests now, or a file of it is damaged. A trial that is no longer in the plan stays on disk and
 // appears in no table. Throws IoError if the folder cannot be written or holds a plan that shares
 // no trial with this one, or if an input file changes during the work; InputError as SelectTrials
 // does, and Cancelled on request.
