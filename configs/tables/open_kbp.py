@@ -3,12 +3,14 @@
 
     open_kbp.py SITE_DEPTHS.csv > configs/tables/open_kbp.yaml
     open_kbp.py SITE_DEPTHS.csv --check OTHER_DEPTHS.csv     # how well it predicts each head without it, and heads of another source
+    open_kbp.py SITE_DEPTHS.csv --scatter configs/tables/t_table_2023.yaml     # depth_scatter (docs/explanation/plausibility.md) of the heads
 
 Build is a person's mean deviation from the means of log depth, in standard deviations of the sites. Depths are means, deviations and
 correlations of mm, as the table's format has them; values that lie beyond 3 robust deviations of log depth at their site (a ray that
 left through the open mouth, a bite block) are left out.
 """
 import csv
+import re
 import sys
 
 import numpy as np
@@ -136,8 +138,22 @@ def without_outliers_by(table, names, head):
     return np.where(np.abs(z) > limit, np.nan, head)
 
 
+def scatter(names, depths, table):
+    """The least, median and largest scatter of the heads' depths over a table's means, as factors."""
+    text = open(table).read()
+    means = {site: float(mean) for site, mean in re.findall(r'site: "?(\w+)"?\n.*\n.*\n +adult: \{mean: ([\d.]+)', text)}
+    own = [k for k, name in enumerate(names) if name.split("_")[0] in means]
+    logs = np.log(depths[:, own] / np.array([means[names[k].split("_")[0]] for k in own]))
+    logs = logs[(~np.isnan(logs)).sum(axis=1) >= 10]
+    factors = np.exp(np.sqrt(np.nanmean((logs - np.nanmedian(logs, axis=1, keepdims=True)) ** 2, axis=1)))
+    print(f"{len(factors)} heads: {factors.min():.2f}, median {np.median(factors):.2f}, {factors.max():.2f}")
+
+
 def main():
     names, depths = read(sys.argv[1])
+    if "--scatter" in sys.argv:
+        scatter(names, depths, sys.argv[sys.argv.index("--scatter") + 1])
+        return
     if "--check" in sys.argv:
         check(names, depths, *read(sys.argv[sys.argv.index("--check") + 1]))
         return
