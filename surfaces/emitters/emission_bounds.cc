@@ -105,7 +105,7 @@ EmissionBounds BoundsOn(const FlatKernel& kernel, const EmitterTriangle& t, cons
     const double furthest =
         (box.center - t.centroid).norm() + box.radius_mm + std::sqrt(t.longest2_mm2);
     bounds.least = kernel.Above(t, t.least_share, above, kernel.Lowered(t, furthest));
-    bounds.least_at_corner = above >= kernel.Lowest(t, furthest * furthest);
+    bounds.least_at_corner = above >= kernel.Lowest(t);
   }
   return bounds;
 }

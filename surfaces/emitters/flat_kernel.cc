@@ -19,9 +19,9 @@ namespace {
 constexpr double kTiny = 1e-300;       // mm^2; avoids 1 / 0
 constexpr double kLostDigits = 1e-13;  // the closed form keeps 1e-16 / 1e-13 = 0.1 % after
                                        // cancellation
-// The largest (longest edge / distance)^2 for the centroid rule on one triangle, and for the
-// edge-midpoint rule on a part of it. Smaller values cost time and gain accuracy.
-constexpr double kCentroidShare = 0.02, kMidpointShare = 0.06;
+// The largest (longest edge / distance)^2 for the centroid rule on one triangle, for powers up to
+// 9. A smaller value costs time and gains accuracy.
+constexpr double kCentroidShare = 0.02;
 
 // A quadrature point, centroid + ab u + ac v, and its weight.
 struct Sample {
@@ -66,6 +66,9 @@ constexpr auto kTwelve = [] {
 // The largest (longest edge / distance)^2 for which the centroid with the second derivative, six
 // points and twelve points err by less than 1 %, for powers up to 9 (found by experiment).
 constexpr std::array<double, 3> kMaxShare = {0.04, 0.35, 0.9};
+
+// The factor of these shares for higher powers, whose integrands are steeper (found by experiment).
+double ShareOfPower(double power) { return std::min(1.0, std::pow(9.0 / power, 1.6)); }
 
 // Four lanes, from `first` on, and a point relative to them.
 struct Four {
@@ -223,9 +226,8 @@ void FlatEmitterLanes::SetSlope(int lane, const Vec3& slope) {
 }
 
 FlatQuadrature::FlatQuadrature(int of_power) : power(of_power) {
-  const double of_share = std::min(1.0, std::pow(9.0 / power, 1.6));  // found by experiment
   for (std::size_t n = 0; n < most_share.size(); ++n) {
-    most_share[n] = of_share * kMaxShare[n];
+    most_share[n] = ShareOfPower(power) * kMaxShare[n];
   }
 }
 
@@ -250,6 +252,8 @@ FlatKernel::FlatKernel(const FlatEmitter& o)
     : decay_(o.decay),
       closed_(o.decay == std::floor(o.decay) ? static_cast<int>(o.decay) + 1 : -1),
       flat_share_(closed_ > 0 ? std::pow(kLostDigits, 2.0 / closed_) : 0),
+      centroid_share_(ShareOfPower(o.decay + 3) * kCentroidShare),
+      part_share_(ShareOfPower(o.decay + 3) * kMaxShare[2]),
       falloff_(MakeFalloff(o.decay + 3, true, 0)),
       quadrature_(std::max(closed_, 1) + 2) {}
 
@@ -288,14 +292,15 @@ double FlatKernel::Sum(std::span<const FlatEmitterLanes> lanes, std::span<const 
 
 double FlatKernel::Emission(const EmitterTriangle& t, const Vec3& p, double height) const {
   const double r2 = (p - t.centroid).squaredNorm();
-  if (t.longest2_mm2 <= kCentroidShare * r2) {
+  if (t.longest2_mm2 <= centroid_share_ * r2) {
     const double far = t.gain * height * falloff_.InversePower(r2);
     return std::min(far * FarShare(t, p - t.centroid, r2), kMaxEmission);
   }
-  if (closed_ < 0) {
+  const double counted = std::max(height, Lowest(t));
+  if (closed_ < 0 || counted * counted < flat_share_ * r2) {
     return std::min(t.gain * height * Mean(t, p, t.a, t.b, t.c, t.longest2_mm2), kMaxEmission);
   }
-  const double integral = ClosedForm(t, p, std::max(height, Lowest(t, r2)));
+  const double integral = ClosedForm(t, p, counted);
   return std::min(t.gain * height * integral / t.area_mm2, kMaxEmission);
 }
 
@@ -305,12 +310,10 @@ double FlatKernel::Above(const EmitterTriangle& t, double depth_share, double he
   return std::min(gain * height * falloff_.InversePower(distance * distance), kMaxEmission);
 }
 
-double FlatKernel::Lowest(const EmitterTriangle& t, double squared) const {
-  return std::sqrt(std::max(t.Floor2(1), flat_share_ * squared));
-}
+double FlatKernel::Lowest(const EmitterTriangle& t) const { return std::sqrt(t.Floor2(1)); }
 
 double FlatKernel::Lowered(const EmitterTriangle& t, double distance) const {
-  return std::sqrt((1 + flat_share_) * distance * distance + t.Floor2(1));
+  return std::sqrt(distance * distance + t.Floor2(1));
 }
 
 double FlatKernel::ClosedForm(const EmitterTriangle& t, const Vec3& p, double height) const {
@@ -354,19 +357,23 @@ double FlatKernel::FarShare(const EmitterTriangle& t, const Vec3& from, double r
   return 1 + bend + decay_ * (power * nearer / r2 + 0.5 * (decay_ - 1) * rise2);
 }
 
-// The mean of |p - q|^-(k+3), weighted by (relative depth)^k, over the part abc of a triangle.
+// The mean of |p - q|^-(k+3), weighted by (relative depth)^k, over the part abc of a triangle, by
+// twelve points of each of its parts that is small against its distance.
 double FlatKernel::Mean(const EmitterTriangle& t, const Vec3& p, const Vec3& a, const Vec3& b,
                         const Vec3& c, double longest2) const {
   const double floor2 = t.Floor2(1);
-  const Vec3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
-  const double r2 = std::max((p - (a + b + c) / 3).squaredNorm(), floor2);
-  if (longest2 <= kMidpointShare * r2) {
-    const auto at = [&](const Vec3& q) {
+  const Vec3 centroid = (a + b + c) / 3;
+  const double r2 = std::max((p - centroid).squaredNorm(), floor2);
+  if (longest2 <= part_share_ * r2) {
+    double sum = 0;
+    for (const Sample& s : kTwelve) {
+      const Vec3 q = centroid + s.u * (b - a) + s.v * (c - a);
       const double value = falloff_.InversePower(std::max((p - q).squaredNorm(), floor2));
-      return t.IsSloped() ? value * Weight(t, (q - t.centroid).dot(t.slope)) : value;
-    };
-    return (at(ab) + at(bc) + at(ca)) / 3;
+      sum += s.weight * (t.IsSloped() ? value * Weight(t, (q - t.centroid).dot(t.slope)) : value);
+    }
+    return sum;
   }
+  const Vec3 ab = 0.5 * (a + b), bc = 0.5 * (b + c), ca = 0.5 * (c + a);
   const double quarter = longest2 / 4;
   return (Mean(t, p, a, ab, ca, quarter) + Mean(t, p, ab, b, bc, quarter) +
           Mean(t, p, ca, bc, c, quarter) + Mean(t, p, ab, bc, ca, quarter)) /

@@ -70,8 +70,10 @@ void AddFlat(std::span<const FlatEmitterLanes> batches, std::span<const std::int
              const Vec3& p, const FlatQuadrature& quadrature, FlatWalk& walk);
 
 // The flat emitter with any decay. For near triangles an integer decay uses the closed form of
-// polygon_integral.h. Other decays use the edge-midpoint rule (exact for quadratics) on ever
-// smaller triangles.
+// polygon_integral.h, unless the point lies so low beside the triangle that its terms cancel. This
+// is the rule for high decays and large triangles: with decay 15 a point lower than 15 % of its
+// distance from the centroid, with decay 6 one lower than 1.4 %. There, and for other decays, the
+// mean is by quadrature over parts of the triangle, as small as their distance requires.
 class FlatKernel {
  public:
   // Number of emitters that are summed or left out together.
@@ -98,10 +100,9 @@ class FlatKernel {
   // The emission if all points of the triangle were at this distance and had this relative depth;
   // at most kMaxEmission.
   double Above(const EmitterTriangle& t, double depth_share, double height, double distance) const;
-  // The smallest height that counts; smaller heights count as this one. It keeps the emission
-  // finite on the triangle, and the closed form accurate beside it. squared: distance^2 from the
-  // centroid.
-  double Lowest(const EmitterTriangle& t, double squared) const;
+  // The smallest height that counts; smaller heights count as this one, so that the emission stays
+  // finite on the triangle.
+  double Lowest(const EmitterTriangle& t) const;
   // An upper bound of the distance that counts for a point at `distance`, however low it is.
   double Lowered(const EmitterTriangle& t, double distance) const;
 
@@ -113,8 +114,10 @@ class FlatKernel {
               double longest2) const;
 
   double decay_;
-  int closed_;         // n of IntegrateInversePower; -1 without a closed form
-  double flat_share_;  // smallest height^2 / distance^2 for the closed form
+  int closed_;             // n of IntegrateInversePower; -1 without a closed form
+  double flat_share_;      // smallest height^2 / distance^2 for the closed form
+  double centroid_share_;  // largest (longest edge / distance)^2 for FarShare
+  double part_share_;      // the same for a part of the triangle in Mean
   Falloff falloff_;
   FlatQuadrature quadrature_;  // used if there is a closed form
 };

@@ -187,6 +187,52 @@ TEST(FlatEmitter, ATriangleAloneIsItsIntegral) {
   }
 }
 
+// The integral over the triangle in the plane z = 0 of |p - q|^-(k+3), in polar coordinates around
+// the foot of p. Along the radius it is elementary: 1 / (k+1) times the difference of |p -
+// q|^-(k+1) between both ends. Around the foot each edge is summed by the midpoint rule. The angles
+// add up to 2 pi if the foot lies inside the triangle, else to 0.
+double IntegralAroundFoot(const TriMesh& t, double decay, const Vec3& p) {
+  const int parts = 4000;
+  double sum = 0, angle = 0;
+  for (int e = 0; e < 3; ++e) {
+    const Vec3 &a = t.points[e], &b = t.points[(e + 1) % 3];
+    for (int k = 0; k < parts; ++k) {
+      const double from = static_cast<double>(k) / parts, to = (k + 1.0) / parts;
+      const Vec3 first = a + from * (b - a) - p, last = a + to * (b - a) - p;
+      const double turn = std::atan2(first.x() * last.y() - first.y() * last.x(),
+                                     first.x() * last.x() + first.y() * last.y());
+      sum -= turn * std::pow((0.5 * (first + last)).norm(), -(decay + 1));
+      angle += turn;
+    }
+  }
+  const bool inside = angle > 1;
+  return (sum + (inside ? 2 * std::numbers::pi * std::pow(p.z(), -(decay + 1)) : 0)) / (decay + 1);
+}
+
+// Low over and beside a triangle that is large against the depth and the height, where the closed
+// form of high decays loses all digits.
+TEST(FlatEmitter, ALargeTriangleIsItsIntegralForHighDecaysToo) {
+  const TriMesh triangle{{{0, 0, 0}, {60, 0, 0}, {15, 45, 0}}, {{0, 1, 2}}};
+  const double depth_mm = 5;
+  std::vector<std::int32_t> only = {0};
+  for (const double decay : {6.0, 12.5, 15.0, 20.0, 30.0}) {
+    const ImplicitSurface surface(triangle, std::vector<double>(3, depth_mm),
+                                  {FlatEmitter{decay}, 0});
+    Random random(9);
+    for (int n = 0; n < 60; ++n) {
+      const Vec3 p(random.Uniform(-15, 75), random.Uniform(-15, 60), random.Uniform(1, 8));
+      const double emission =
+          std::min(kMaxEmission, (decay + 1) / (2 * std::numbers::pi) * std::pow(depth_mm, decay) *
+                                     p.z() * IntegralAroundFoot(triangle, decay, p));
+      EXPECT_NEAR(surface.SumEmissions(only, p) / emission, 1, 0.012)
+          << decay << ": " << p.transpose();
+      if (emission > 1e-3) {
+        EXPECT_NEAR((surface.Value(p) + 1) / emission, 1, 0.012) << decay << ": " << p.transpose();
+      }
+    }
+  }
+}
+
 TEST(FlatEmitter, WithLinearDepthATriangleIsTheIntegralOfItsDepth) {
   for (const double decay : {6.0, 5.0, 4.5}) {
     for (const Vec3& depth : {Vec3(7.3, 7, 6.6), Vec3(4, 7, 9), Vec3(7, 7, 7)}) {
