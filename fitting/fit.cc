@@ -36,21 +36,22 @@ std::vector<ScheduleStep> MakeSweep(const std::vector<ScheduleStep>& steps) {
 }
 
 // Moves the vertices to c + fraction (c' - c). A vertex that did not move in the solve, or that is
-// in `stay`, keeps its exact bits. Returns the longest move.
-double WriteBack(ControlNet solved, const ScheduleStep& step, std::span<const int> stay,
-                 HSplineSurface& surface) {
+// in `stay`, keeps its exact bits. Sets the summary's longest move and number of moved vertices.
+void WriteBack(ControlNet solved, const ScheduleStep& step, std::span<const int> stay,
+               HSplineSurface& surface, LevelSummary& summary) {
   ControlNet net = surface.Net(step.level);
-  double longest = 0;
+  summary.max_move_mm = 0;
+  summary.moved_vertices = 0;
   for (const int k : stay) {
     solved.vertices[k] = net.vertices[k];
   }
   for (std::size_t k = 0; k < net.vertices.size(); ++k) {
     const Vec3 move = step.fraction * (solved.vertices[k] - net.vertices[k]);
     net.vertices[k] += move;
-    longest = std::max(longest, move.norm());
+    summary.max_move_mm = std::max(summary.max_move_mm, move.norm());
+    summary.moved_vertices += move.norm() >= kLeastMove_mm ? 1 : 0;
   }
   surface.SetNet(step.level, net);
-  return longest;
 }
 
 // The weight of the PriorTerm that holds features; 0 for rules without one.
@@ -271,7 +272,7 @@ class Fitter {
     LevelSummary summary = std::move(solution.summary);
     summary.level = step.level;
     summary.fraction = step.fraction;
-    summary.max_move_mm = WriteBack(std::move(solution.net), step, stay, result_.surface);
+    WriteBack(std::move(solution.net), step, stay, result_.surface, summary);
     summary.rms_before_mm = driver_.rms_mm();
     summary.rms_after_mm = report == SolveReport::kFull
                                ? PointRms(result_.surface, driver_.target(), context_.threads)

@@ -25,6 +25,9 @@ struct TermCosts {
   double after = kNaN;   // mm^2, at the solution, before the step's fraction is applied
 };
 
+// A vertex counts as moved from this move on.
+inline constexpr double kLeastMove_mm = 0.01;
+
 struct LevelSummary {
   int level = -1;                // set by Fit
   double fraction = kNaN;        // set by Fit
@@ -38,8 +41,11 @@ struct LevelSummary {
   // Estimated numerical rank of the observations' matrix; free_vertices - rank directions are left
   // to the other terms, or stay. -1: not computed (adaptive fits compute it at the end).
   int rank = -1;
-  double max_move_mm = kNaN;       // largest move of a vertex; Fit: after the step's fraction
-  double auto_weight = kNaN;       // weight that was chosen for `weight: auto`, if a term has it
+  int moved_vertices = -1;    // vertices that the step moved; -1: not counted (adaptive fits)
+  double max_move_mm = kNaN;  // largest move of a vertex; Fit: after the step's fraction
+  double auto_weight = kNaN;  // weight that was chosen for `weight: auto`, if a term has it
+  // Weight of the hold that kept weakly determined vertices from running away (FitLevel); 0: none.
+  double hold = 0;
   std::string solver = "not run";  // ceres or direct
   std::string termination = "not run";
   bool usable = false;  // false: the solver failed and the net is unchanged

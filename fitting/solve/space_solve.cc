@@ -675,12 +675,68 @@ HSplineSurface SpaceSolve::SurfaceAfter(const Eigen::MatrixX3d& step) const {
   return moved.Surface();
 }
 
-LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver,
-                       SolveReport report) {
+namespace {
+
+LevelSolution SolveLevel(LevelView view, std::span<const Term> terms, Solver solver,
+                         SolveReport report) {
   LevelSolution solution{.net = view.start, .summary = {}};
   LevelSolve solve(std::move(view), terms, solver);
   solution.summary = solve.FinalSolve(report);
   solution.net.vertices = solve.Values().vertices;
+  return solution;
+}
+
+// Returns true if no term restricts the vertices beyond the points.
+bool OnlyPoints(std::span<const Term> terms) {
+  return std::ranges::all_of(terms, [](const Term& term) {
+    return !IsActive(term) || IsOfPoints(term) || std::holds_alternative<TangentPointTerm>(term);
+  });
+}
+
+// The largest distance of an observation from the surface at the start.
+double LargestMisfit_mm(const LevelView& view) {
+  double largest = 0;
+  for (const Observation& o : view.observations) {
+    largest = std::max(largest, (view.PointAt(o.uv, view.start) - o.position).norm());
+  }
+  return largest;
+}
+
+// Solves again with a hold that draws all vertices towards their start.
+LevelSolution SolveHeld(const LevelView& view, std::vector<Term> terms, double weight,
+                        Solver solver, SolveReport report) {
+  terms.emplace_back(PriorTerm{.weight = weight, .towards = PriorTowards::kStart});
+  LevelSolution solution = SolveLevel(view, terms, solver, report);
+  if (!solution.summary.terms.empty()) {
+    solution.summary.terms.pop_back();  // of the hold
+  }
+  solution.summary.hold = weight;
+  return solution;
+}
+
+}  // namespace
+
+// Points alone may determine a combination of vertices by differences of almost equal weights, as
+// seeds at the centres of all patches do with a wave from vertex to vertex. Least squares then
+// moves vertices by metres to remove a misfit of millimetres. The smallest hold is taken, in steps
+// of ten, that keeps the vertices within kReach misfits. A reach of 9 is what the shortest wave
+// that a net can follow needs: a third of a vertex's move arrives at the surface in each direction.
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver,
+                       SolveReport report) {
+  constexpr double kReach = 10, kLeastHold = 1e-7, kMostHold = 1;  // of the terms' weight
+  if (!OnlyPoints(terms) || view.observations.empty()) {
+    return SolveLevel(std::move(view), terms, solver, report);
+  }
+  const double reach_mm = kReach * LargestMisfit_mm(view);
+  LevelSolution solution = SolveLevel(view, terms, solver, report);
+  double weight = 0;
+  for (const Term& term : terms) {
+    weight += TermWeight(term);
+  }
+  for (double hold = kLeastHold; solution.summary.max_move_mm > reach_mm && hold <= 1.5 * kMostHold;
+       hold *= 10) {
+    solution = SolveHeld(view, {terms.begin(), terms.end()}, hold * weight, solver, report);
+  }
   return solution;
 }
 

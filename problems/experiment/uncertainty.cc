@@ -184,6 +184,15 @@ int FinestLevel(const FitResult& fit) {
   return finest;
 }
 
+// The terms of the last solve, with the hold that it needed (FitLevel).
+std::vector<Term> TermsOfLastSolve(const Experiment& experiment, const FitResult& fit) {
+  std::vector<Term> terms = experiment.fit.terms;
+  if (!fit.levels.empty() && fit.levels.back().hold > 0) {
+    terms.emplace_back(PriorTerm{.weight = fit.levels.back().hold});
+  }
+  return terms;
+}
+
 FitTarget WithFinalUv(FitTarget target, const FitResult& fit) {
   for (std::size_t k = 0; k < target.points.size(); ++k) {
     target.points[k].uv = fit.uv[k];
@@ -238,7 +247,7 @@ FaceUncertainty MakeUncertainty(const Experiment& experiment, const DepthStage& 
   const int level = FinestLevel(fitted.fit);
   FaceUncertainty result;
   const ErrorPropagation spread(
-      surface, fitted.rest, target, level, experiment.fit.terms,
+      surface, fitted.rest, target, level, TermsOfLastSolve(experiment, fitted.fit),
       FindPointErrors(experiment, stage, surface, target, result, context));
   for (const std::string_view name : spread.left_out()) {
     result.left_out.emplace_back(name);

@@ -262,6 +262,37 @@ TEST(ScheduleStep, ReducedPointsAndTheDirectPathKeepTheMinimiser) {
   }
 }
 
+// Seeds at the centres of all patches hardly determine the wave from vertex to vertex, and points
+// beside them contradict them. Least squares moves vertices without bound to fit both.
+TEST(ScheduleStep, PointsAloneDoNotMakeVerticesRunAway) {
+  const int side = 24;
+  const LevelView seeds = [&] {
+    std::vector<Observation> all;
+    for (int k = 0; k < side * side; ++k) {
+      const Vec2 uv = Vec2(k % side + 0.5, k / side + 0.5) / side;
+      all.push_back(
+          {.uv = uv, .position = PlainStencil(side, side, uv).Apply(Sheet(side, side, 0, 0))});
+    }
+    return View(Sheet(side, side, 0, 0), all);
+  }();
+  LevelView both = seeds;
+  const double misfit_mm = 3;
+  for (int k = 0; k < 9; ++k) {
+    Observation beside = seeds.observations[side * (3 + 2 * (k / 3)) + 4 + 5 * (k % 3)];
+    beside.uv.x() += 0.02 / side;
+    beside.position.z() += misfit_mm;
+    both.observations.push_back(beside);
+  }
+  for (const Solver solver : {Solver::kCeres, Solver::kFastest}) {
+    const LevelSolution solution = FitLevel(both, std::vector<Term>{PointTerm{}}, solver);
+    EXPECT_GT(solution.summary.hold, 0);
+    EXPECT_LT(solution.summary.max_move_mm, 10 * misfit_mm);
+    EXPECT_EQ(solution.summary.terms.size(), 1u);
+    EXPECT_LT(solution.summary.rms_after_mm, solution.summary.rms_before_mm);
+    EXPECT_EQ(FitLevel(seeds, std::vector<Term>{PointTerm{}}, solver).summary.hold, 0);
+  }
+}
+
 // The sum of squares changes by a constant, whatever the rank of the rows.
 TEST(RowReduction, KeepsTheNormalEquationsInAsFewRows) {
   Random random(5);
