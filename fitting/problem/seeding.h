@@ -7,6 +7,7 @@
 #include <array>
 #include <span>
 #include <string_view>
+#include <variant>
 #include <vector>
 
 #include "fitting/problem/fit_target.h"
@@ -25,6 +26,7 @@ enum class SeedMethod { kRay, kClosest };
 constexpr auto EnumNames(SeedMethod) { return std::to_array<std::string_view>({"ray", "closest"}); }
 
 struct SeedOptions {
+  static constexpr std::string_view kName = "patches";
   SeedMethod method = SeedMethod::kRay;
   int level = 2;
   int direction_level = 0;
@@ -66,6 +68,15 @@ void Fields(Visitor& visit, SeedOptions& o) {
                   .doc = "weight of a seed in the fit; a standard dowel has 1"},
         o.weight);
 }
+
+// No seeds: the fit has the dowels alone (thesis figure 4.3).
+struct NoSeeds {
+  static constexpr std::string_view kName = "none";
+};
+template <class Visitor>
+void Fields(Visitor&, NoSeeds&) {}
+
+using SeedSource = std::variant<SeedOptions, NoSeeds>;
 
 struct SeedResult {
   std::vector<FitPoint> points;  // seeds, labelled seed_i_j after their patch (i, j), i fastest

@@ -4,8 +4,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
+#include <vector>
 
+#include "interp/dowels/dowel_area.h"
 #include "problems/subject/sites.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/hspline_query/tessellate.h"
@@ -174,6 +177,48 @@ class Rays {
   SurfaceProjector projector_;
 };
 
+// Interpolates (u,v) over the areas of the dowels whose (u,v) is known.
+class KnownAreas {
+ public:
+  KnownAreas(std::span<const Dowel> dowels, const DowelNetwork& network, const TemplateFace& placed,
+             const ExtraSites& sites)
+      : is_closed_(placed.surface.shape().ClosedU()) {
+    std::vector<std::size_t> unknown;
+    for (std::size_t k = 0; k < dowels.size(); ++k) {
+      if (const auto uv = KnownUv(dowels[k].site, placed, sites)) {
+        uv_.push_back(*uv);
+      } else {
+        unknown.push_back(k);
+      }
+    }
+    const ShownDowels known = LeaveOutDowels(dowels, network, unknown);
+    if (!known.network.areas.empty()) {
+      areas_ = DowelAreas("inserted_uv", {TriMesh(), {}, known.dowels, known.network});
+    }
+  }
+
+  std::optional<Vec2> At(const Vec3& p) const {
+    const AreaPoint at = FindArea(areas_, AreaDistance::kTriangle, p);
+    if (at.area == nullptr) {
+      return std::nullopt;
+    }
+    const Vec2 first = uv_[at.area->dowels[0]];
+    Vec2 uv = first;
+    for (int k = 1; k < 3; ++k) {
+      Vec2 step = uv_[at.area->dowels[k]] - first;
+      step.x() -= is_closed_ ? std::round(step.x()) : 0;  // the short way round
+      uv += at.weights[k] * step;
+    }
+    uv.x() -= is_closed_ ? std::floor(uv.x()) : 0;
+    return uv;
+  }
+
+ private:
+  bool is_closed_;
+  std::vector<Vec2> uv_;  // of the known dowels
+  std::vector<DowelArea> areas_;
+};
+
 }  // namespace
 
 FitTarget KnownDowels(std::span<const Dowel> dowels, const TemplateFace& face,
@@ -197,14 +242,19 @@ Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& known,
   return PlaceTemplate(on_template, on_subject, {}, options);
 }
 
-FitTarget AllDowels(std::span<const Dowel> dowels, const TemplateFace& placed,
-                    const ExtraSites& sites) {
+FitTarget AllDowels(std::span<const Dowel> dowels, const DowelNetwork& network,
+                    const TemplateFace& placed, const Experiment& experiment) {
   FitTarget target;
+  std::optional<KnownAreas> areas;
+  if (experiment.inserted_uv == InsertedUv::kNeighbours) {
+    areas.emplace(dowels, network, placed, experiment.sites);
+  }
   std::optional<Rays> rays;
   for (const Dowel& dowel : dowels) {
-    std::optional<Vec2> uv = KnownUv(dowel.site, placed, sites);
+    std::optional<Vec2> uv = KnownUv(dowel.site, placed, experiment.sites);
     if (!uv && !IsStandardSite(dowel.site)) {
-      uv = (rays ? *rays : rays.emplace(placed.surface)).Meet(dowel);
+      uv = areas ? areas->At(dowel.base) : std::nullopt;
+      uv = uv ? uv : (rays ? *rays : rays.emplace(placed.surface)).Meet(dowel);
     }
     if (uv) {
       Add(dowel, *uv, target);

@@ -9,6 +9,8 @@
 #include "fitting/problem/fit_target.h"
 #include "fitting/problem/placement.h"
 #include "interp/dowels/dowel.h"
+#include "interp/dowels/dowel_network.h"
+#include "problems/experiment/experiment.h"
 #include "problems/face/template_face.h"
 #include "problems/subject/extra_sites.h"
 #include "surfaces/mesh/tri_mesh.h"
@@ -52,10 +54,15 @@ FitTarget KnownDowels(std::span<const Dowel> dowels, const TemplateFace& face,
 Similarity PlaceOnDowels(const TemplateFace& generic, const FitTarget& known,
                          const PlacementOptions& options);
 
-// The known dowels and those that are not at a standard site. The (u,v) of the latter is the point
-// in which the ray of the dowel meets `placed`, the face in the subject's frame (thesis 4.2). If
-// the ray misses, it is the point of the surface nearest to the tip. In the dowels' order.
-FitTarget AllDowels(std::span<const Dowel> dowels, const TemplateFace& placed,
-                    const ExtraSites& sites);
+// The known dowels and those that are not at a standard site, in the dowels' order. The (u,v) of
+// the latter follow from experiment.inserted_uv:
+//   kNeighbours: in an area of known dowels the barycentric mean of their (u,v), with the weights
+//     that its depth would have (thesis 2.2, 4.2). Elsewhere as kRay.
+//   kRay: the point in which the ray of the dowel meets `placed`, the face in the subject's frame
+//     (thesis 4.2). If the ray misses, it is the point of the surface nearest to the tip.
+// network: the areas of the dowels. Areas with a dowel that is not known are closed over by those
+// of its neighbours (LeaveOutDowels).
+FitTarget AllDowels(std::span<const Dowel> dowels, const DowelNetwork& network,
+                    const TemplateFace& placed, const Experiment& experiment);
 
 }  // namespace semblance::problems

@@ -275,7 +275,9 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   const TemplateLevels levels = FindLevels(experiment.face_template);
   LevelCheck check(levels);
   check.Steps("first_fit", experiment.first_fit);
-  check.At("seeds.direction_level", experiment.seeds.direction_level);
+  if (const auto* const seeds = std::get_if<SeedOptions>(&experiment.seeds)) {
+    check.At("seeds.direction_level", seeds->direction_level);
+  }
   std::vector<OptionFault> faults = check.Take();
   for (const FitFault& fault : FindFitFaults(experiment.fit, levels.finest)) {
     faults.push_back(

@@ -227,6 +227,12 @@ void Fields(Visitor& visit, UncertaintyOptions& o) {
         o.unseen_reach_mm);
 }
 
+// The (u,v) of dowels that are not at a site of the generic face (AllDowels).
+enum class InsertedUv { kRay, kNeighbours };
+constexpr auto EnumNames(InsertedUv) {
+  return std::to_array<std::string_view>({"ray", "neighbours"});
+}
+
 using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
 
 struct Experiment {
@@ -242,13 +248,15 @@ struct Experiment {
   ImplicitFaceOptions implicit;
   TemplateSource face_template = IctTemplate{};  // the option `template`
   PlacementOptions placement;
+  InsertedUv inserted_uv = InsertedUv::kRay;
   PriorSource prior = IctPrior{};
   FaceSource face;
   BustSource bust;
   std::vector<Alternative> alternatives;
   FeatureRules rules;
   std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
-  SeedOptions seeds = {.weight = 0.1};  // seeds are many, and must not outweigh the dowels
+  SeedSource seeds =
+      SeedOptions{.weight = 0.1};  // seeds are many, and must not outweigh the dowels
   double cut_margin_mm = 5;
   int rounds = 1;
   FitOptions fit = {.relaxation = FootpointRelaxation{}};
@@ -289,6 +297,12 @@ void Fields(Visitor& visit, Experiment& o) {
         o.face_template);
   visit(FieldInfo{.name = "placement", .doc = "how the generic face is brought to the dowels"},
         o.placement);
+  visit(FieldInfo{.name = "inserted_uv",
+                  .doc = "(u,v) of a dowel at a site that the generic face lacks; ray: where the "
+                         "dowel meets the placed face; neighbours: interpolated from the three "
+                         "dowels of its area, as its depth would be (thesis 4.2); outside the "
+                         "network as ray"},
+        o.inserted_uv);
   visit(FieldInfo{.name = "prior",
                   .doc = "a statistical model of faces: mean and modes on one mesh; `template` is "
                          "then the H-spline of its mean; ict is the one of `template: ict`"},
@@ -320,7 +334,11 @@ void Fields(Visitor& visit, Experiment& o) {
                   .doc = "steps of a fit to the dowels alone, before seeds are taken; may be "
                          "empty"},
         o.first_fit);
-  visit(FieldInfo{.name = "seeds", .doc = "extra dowels on the implicit face"}, o.seeds);
+  visit(FieldInfo{.name = "seeds",
+                  .doc = "extra dowels on the implicit face; patches: one at the centre of each "
+                         "patch of a level; none: the fit has the dowels alone (thesis 4.2, figure "
+                         "4.3)"},
+        o.seeds);
   visit(FieldInfo{.name = "cut_margin_mm",
                   .unit = "mm",
                   .min = -50,

@@ -40,11 +40,11 @@ TemplateFace InSubjectFrame(const TemplateFace& generic, const Similarity& face_
 }
 
 PlacedTemplate Place(const TemplateFace& generic, const std::vector<Dowel>& dowels_on_bone,
-                     const Experiment& experiment) {
+                     const DowelNetwork& network, const Experiment& experiment) {
   const Similarity face_from_template = PlaceOnDowels(
       generic, KnownDowels(dowels_on_bone, generic, experiment.sites), experiment.placement);
   TemplateFace placed = InSubjectFrame(generic, face_from_template);
-  FitTarget dowels = AllDowels(dowels_on_bone, placed, experiment.sites);
+  FitTarget dowels = AllDowels(dowels_on_bone, network, placed, experiment);
   return {std::move(dowels), face_from_template, std::move(placed)};
 }
 
@@ -55,7 +55,7 @@ PlacedTemplate Place(const TemplateFace& generic, const std::vector<Dowel>& dowe
 // The options of seeding and fitting, as the way to the face changes them.
 struct FitPlan {
   std::vector<ScheduleStep> first_fit;
-  SeedOptions seeds;
+  SeedSource seeds;
   FitOptions fit;
   int rounds;
 };
@@ -153,6 +153,17 @@ void LayOnField(const HSplineSurface& surface, const SeedOptions& options,
   }
 }
 
+SeedResult MakeSeeds(const HSplineSurface& surface, const MeshQuery& query, const FaceInput& in,
+                     std::span<const Sphere> masks, const SeedSource& source) {
+  const auto* const options = std::get_if<SeedOptions>(&source);
+  if (options == nullptr) {
+    return {.points = {}, .masked = 0, .missed = 0, .folded = 0};
+  }
+  SeedResult seeding = SeedDowels(surface, query, in.implicit, masks, *options);
+  LayOnField(surface, *options, in.field, seeding.points);
+  return seeding;
+}
+
 // Fits the dowels first. Then each round takes seeds from the surface as it lies now and runs the
 // schedule with dowels and seeds (see seeding.h for the reason).
 FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInput& in,
@@ -166,8 +177,7 @@ FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInp
   std::optional<FaceFit> result;
   for (int round = 0; round < plan.rounds; ++round) {
     context.Report("fit", fmt::format("round {} of {}", round + 1, plan.rounds));
-    SeedResult seeding = SeedDowels(surface, query, in.implicit, masks, plan.seeds);
-    LayOnField(surface, plan.seeds, in.field, seeding.points);
+    SeedResult seeding = MakeSeeds(surface, query, in, masks, plan.seeds);
     Weigh(dowels, known, seeding.points);
     FitTarget target = WithSeeds(dowels, seeding.points, plan.fit.terms, in.shell);
     target.shape = known.shape;
@@ -493,7 +503,9 @@ double TipVarianceRatio(const PriorThenFit& o, const FaceInput& in) {
 FitPlan PlanFitOnPrior(const PriorThenFit& o, const FaceInput& in) {
   FitPlan plan = PlanFit(in.experiment);
   plan.first_fit.clear();  // seeds are taken on the prior's face
-  plan.seeds.weight = o.seed_weight;
+  if (auto* const seeds = std::get_if<SeedOptions>(&plan.seeds)) {
+    seeds->weight = o.seed_weight;
+  }
   std::vector<Term>& terms = plan.fit.terms;
   const bool named = std::ranges::any_of(
       terms, [](const Term& term) { return std::holds_alternative<PriorShapeTerm>(term); });
@@ -549,7 +561,8 @@ TriMesh SeedableFace(const Experiment& experiment, std::span<const CutPlane> cut
 }
 
 MadeFace MakeFace(const FaceInput& in, const RunContext& context) {
-  PlacedTemplate placed = Place(in.generic, in.subject.dowels_on_bone, in.experiment);
+  PlacedTemplate placed =
+      Place(in.generic, in.subject.dowels_on_bone, in.subject.network, in.experiment);
   return std::visit([&](const auto& way) { return MakeFace(way, std::move(placed), in, context); },
                     WayToFace(in.experiment));
 }

@@ -109,8 +109,10 @@ std::string ShortHash(const std::string& text) {
 }
 
 // Hashes a resolved experiment with the contents of its input files, so that the hash is the same
-// on every machine. Each content is hashed once.
-std::string HashExperiment(const Experiment& experiment, InputContents& contents) {
+// on every machine. Each content is hashed once. The title changes no result, so that equal
+// treatments have one id whatever they are called.
+std::string HashExperiment(Experiment experiment, InputContents& contents) {
+  experiment.title = Experiment().title;
   return ShortHash(ToFlowYaml(
       WithInputs(MakeConfigTree(experiment), NamedFiles(experiment), [&](const NamedFile& input) {
         const auto [known, is_new] = contents.by_input.try_emplace({input.option, input.file});

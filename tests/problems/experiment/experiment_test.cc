@@ -131,7 +131,10 @@ TEST(Experiment, ThePublishedWayIsOneBaseAway) {
   EXPECT_TRUE(std::holds_alternative<Barycentric>(published.interp));
   EXPECT_TRUE(std::holds_alternative<RestoreFeatures>(published.fit.features));
   EXPECT_TRUE(std::holds_alternative<NoRelaxation>(published.fit.relaxation));
-  EXPECT_EQ(published.seeds.weight, 1);
+  EXPECT_EQ(std::get<SeedOptions>(published.seeds).weight, 1);
+  EXPECT_EQ(published.inserted_uv, InsertedUv::kNeighbours);
+  ASSERT_EQ(published.fit.terms.size(), 1u);
+  EXPECT_EQ(std::get<PointTerm>(published.fit.terms[0]).loss, RobustLoss::kNone);
   const std::vector<ScheduleStep> steps = PlanSteps(published.fit.plan),
                                   thesis = PublishedSchedule();
   ASSERT_EQ(steps.size(), thesis.size());
@@ -271,7 +274,8 @@ TEST(Experiment, TheReferenceAndTheSchemaStateTheDefaultsThatResolvedYamlHas) {
   StatedDefaults defaults;
   defaults.Check(MakeConfigTree(Experiment{}), Json::parse(OptionsSchema<Experiment>()), "", "");
   EXPECT_GT(defaults.checked, 60);
-  EXPECT_THAT(OptionsReference<Experiment>(), HasSubstr("\nseeds.weight: number, default 0.1,"));
+  EXPECT_THAT(OptionsReference<Experiment>(),
+              HasSubstr("\nseeds.weight (type: patches): number, default 0.1,"));
 }
 
 TEST(Experiment, ASchemeCanBeSetByItsTypeAlone) {

@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "problems/experiment/dowel_projection.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/skull_stage.h"
 #include "problems/run.h"
@@ -145,6 +146,48 @@ TEST(ExtraDowels, SitesThatCannotBePlacedAreNamedInOneLine) {
   EXPECT_THAT(words("n: {depth: 5}", {"tissue.set_mm={n: 6}"}), HasSubstr("appears twice, here"));
   EXPECT_THAT(words("mn: {near: [n, rhi], depth: 5}", {"tissue.set_mm={mn: 6}"}),
               HasSubstr("sites.mn.depth: the depth appears twice, here"));
+}
+
+// (u,v) of the sites of a standard network, and one dowel in an area and one on an edge of it.
+TEST(ExtraDowels, TheUvOfAnInsertedDowelIsInterpolatedLikeADepth) {
+  const TemplateFace face{.surface = MakeTemplateFace({}).surface,
+                          .site_uv = {{"a", {0.2, 0.3}}, {"b", {0.6, 0.3}}, {"c", {0.2, 0.9}}},
+                          .features = {}};
+  const auto dowel = [](const std::string& site, const Vec3& base) {
+    return Dowel{.site = site, .base = base, .direction = Vec3::UnitZ(), .depth_mm = 5};
+  };
+  const std::vector<Dowel> dowels = {dowel("a", {0, 0, 0}),     dowel("b", {40, 0, 0}),
+                                     dowel("c", {0, 40, 0}),    dowel("inside", {10, 20, 0}),
+                                     dowel("edge", {30, 0, 0}), dowel("outside", {-30, -5, 0})};
+  DowelNetwork network{.areas = {{0, 1, 2}}, .dropped = {}};
+  Experiment experiment;
+  experiment.inserted_uv = InsertedUv::kNeighbours;
+  for (const bool joined : {false, true}) {  // whether the network has areas of the new dowel
+    if (joined) {
+      ASSERT_EQ(InsertIntoNetwork(dowels, 3, network), Insertion::kInside);
+    }
+    const FitTarget target = AllDowels(dowels, network, face, experiment);
+    ASSERT_EQ(target.points.size(), 6u);
+    EXPECT_LT((target.points[3].uv - Vec2(0.2 + 0.25 * 0.4, 0.3 + 0.5 * 0.6)).norm(), 1e-12);
+    EXPECT_LT((target.points[4].uv - Vec2(0.5, 0.3)).norm(), 1e-12);
+    experiment.inserted_uv = InsertedUv::kRay;
+    const FitTarget rays = AllDowels(dowels, network, face, experiment);
+    experiment.inserted_uv = InsertedUv::kNeighbours;
+    EXPECT_EQ(target.points[5].uv, rays.points[5].uv) << "outside the network";
+    EXPECT_NE(target.points[3].uv, rays.points[3].uv);
+  }
+}
+
+TEST(ExtraDowels, WithoutSeedsTheFitHasTheDowelsAlone) {
+  const Experiment experiment =
+      Phantom30("", {"face=fit", "seeds=none", "uncertainty.sigma=false"});
+  EXPECT_THAT(UnusedOptions(experiment), ::testing::IsEmpty());
+  const RunResult result = problems::Run(experiment, {});
+  EXPECT_TRUE(result.seeding.points.empty());
+  EXPECT_EQ(result.seeding.masked, 0);
+  EXPECT_EQ(result.target.points.size(), result.subject.dowels_on_bone.size());
+  EXPECT_TRUE(result.fit.usable);
+  EXPECT_EQ(result.fit.dowel_rms_mm, result.fit.point_rms_mm);
 }
 
 TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeld) {

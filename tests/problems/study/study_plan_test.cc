@@ -43,6 +43,10 @@ class StudyPlanTest : public ::testing::Test {
     return WordsOf<ConfigError>([&] { Plan(text); });
   }
 
+  static const SeedOptions& Seeds(const StudyTrial& trial) {
+    return std::get<SeedOptions>(trial.experiment.seeds);
+  }
+
   ScratchFolder folder_;
 };
 
@@ -58,7 +62,7 @@ TEST_F(StudyPlanTest, EveryCombinationIsOneTrial) {
   std::set<std::string> ids;
   for (const StudyTrial& trial : plan.trials) {
     ids.insert(trial.id);
-    EXPECT_EQ(trial.experiment.seeds.weight == 0.5, trial.experiment.title == "x");
+    EXPECT_EQ(Seeds(trial).weight == 0.5, trial.experiment.title == "x");
   }
   EXPECT_EQ(ids.size(), plan.trials.size());
   EXPECT_THAT(plan.trials[0].values, ElementsAre("nearest", "1", "0.5", "x", "0", ""));
@@ -127,7 +131,7 @@ TEST_F(StudyPlanTest, SamplesStayInTheirRangesAndFillThem) {
   ASSERT_EQ(plan.trials.size(), 10u);
   std::set<int> slices;
   for (const StudyTrial& trial : plan.trials) {
-    slices.insert(static_cast<int>(10 * (trial.experiment.seeds.weight - 1)));
+    slices.insert(static_cast<int>(10 * (Seeds(trial).weight - 1)));
     EXPECT_GE(trial.experiment.rounds, 1);
     EXPECT_LE(trial.experiment.rounds, 5);
   }
@@ -140,10 +144,10 @@ TEST_F(StudyPlanTest, SobolSamplesAreEvenInEachHalfOfARange) {
       "5]}}\n");
   ASSERT_EQ(plan.trials.size(), 15u);
   const Experiment& first = plan.trials[0].experiment;
-  EXPECT_NEAR(first.seeds.weight, 1.5, 1e-12);
+  EXPECT_NEAR(std::get<SeedOptions>(first.seeds).weight, 1.5, 1e-12);
   int low = 0;
   for (const StudyTrial& trial : plan.trials) {
-    low += trial.experiment.seeds.weight < 1.5 ? 1 : 0;
+    low += Seeds(trial).weight < 1.5 ? 1 : 0;
   }
   EXPECT_EQ(low, 7);
 }
@@ -190,6 +194,17 @@ TEST_F(StudyPlanTest, AnIdFollowsTheContentsOfFilesAndNotTheirPaths) {
   WriteFileAtomically(folder_ / "here/e2.yaml", "base: e.yaml\nsubject: {volume: scan}\n");
   WriteFileAtomically(folder_ / "here/s2.yaml", "base: e2.yaml\ngrid: {interp: [nearest]}\n");
   EXPECT_EQ(ReadStudy(folder_ / "here/s2.yaml").trials.at(0).id, id) << "only renamed";
+}
+
+// Two names of one treatment would otherwise run twice and compete with each other.
+TEST_F(StudyPlanTest, AnIdDoesNotFollowTheTitle) {
+  const auto id = [&](const std::string& title) {
+    return Plan(fmt::format("list: [{{title: {}, rounds: 2}}]\n", title)).trials.at(0).id;
+  };
+  EXPECT_EQ(id("two rounds"), id("again"));
+  EXPECT_EQ(id("two rounds"), Plan("grid: {rounds: [2]}\n").trials.at(0).id);
+  EXPECT_THAT(Faults("list: [{title: a, rounds: 2}, {title: b, rounds: 2}]\n"),
+              HasSubstr("are the same experiment"));
 }
 
 TEST_F(StudyPlanTest, ASubjectWithMissingFilesIsSkippedIfOptionalElseAnError) {
