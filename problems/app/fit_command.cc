@@ -77,6 +77,9 @@ int FitCommand(const FitArguments& arguments) {
        result.fit.surface.Net(0).vertices.size() + result.fit.surface.Offsets().size(),
        LengthText(result.fit.point_rms_mm, result.unit),
        LengthText(result.distance.max_mm, result.unit));
+  if (!result.fit.levels.empty()) {
+    Tell("solver: {}\n", result.fit.levels.back().solver);
+  }
   if (result.fit.automatic) {
     Tell("{}", AutoText(*result.fit.automatic, result.unit));
   }

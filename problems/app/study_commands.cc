@@ -69,6 +69,13 @@ void PrintVersions(const StudyResults& results) {
   }
 }
 
+int FindExitCode(const StudyResults& results) {
+  const int done = results.Count("done");
+  return (results.HasMetric() || done == 0) && done == static_cast<int>(results.trials.size())
+             ? kDone
+             : kNotUsable;
+}
+
 // Prints the state of a study's folder, and how to continue.
 int PrintStudyState(const StudyResults& results, const fs::path& root) {
   for (const TrialRow& row : results.trials) {
@@ -92,10 +99,8 @@ int PrintStudyState(const StudyResults& results, const fs::path& root) {
   } else {
     Tell("no report yet; semblance merge {} makes one of the finished trials\n", root.string());
   }
-  const bool has_metric = CheckMetric(results);
-  return has_metric && results.Count("done") == static_cast<int>(results.trials.size())
-             ? kDone
-             : kNotUsable;
+  CheckMetric(results);
+  return FindExitCode(results);
 }
 
 // Prints the state of the trials that --only selected; the others may be missing.
@@ -204,7 +209,8 @@ int MergeCommand(const StudyArguments& a) {
     throw IoError(fmt::format("{}: not the folder of a study; it has no plan.json", root.string()));
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
-  return PrintStudyState(WriteStudyTables(folder), root);
+  const StudyResults results = WriteStudyTables(folder);
+  return a.quiet ? FindExitCode(results) : PrintStudyState(results, root);
 }
 
 int StatusCommand(const StudyArguments& a) {
@@ -303,6 +309,7 @@ void DeclareMerge(CLI::App& merge, CommandLine& line) {
   StudyArguments& a = *Bind(merge, line, &MergeCommand);
   merge.add_option("DIR", a.files, "folder of the study, then folders to take trials from")
       ->required();
+  merge.add_flag("--quiet", a.quiet, "do not print the state of the study");
 }
 
 void DeclareStatus(CLI::App& status, CommandLine& line) {

@@ -492,6 +492,7 @@ TEST_F(FitCommand, TheRmsIsThatOfTheDistances) {
     const double rms = std::sqrt(sum / count);
     EXPECT_NEAR(json["rms_mm"].get<double>(), rms, 1e-9);
     EXPECT_THAT(outcome.out, HasSubstr(fmt::format("RMS {:.4g}, largest", rms)));
+    EXPECT_THAT(outcome.out, HasSubstr("solver: conjugate gradients\n"));
     const bool differ = name == "rough";
     ASSERT_EQ(json.contains("weighted_rms_mm"), differ);
     if (differ) {

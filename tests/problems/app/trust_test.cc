@@ -269,6 +269,10 @@ TEST_F(Trust, AStudysFilesMayHoldAnything) {
     for (const std::string command : {"status s", "merge s", "report s", "merge new s"}) {
       EXPECT_THAT(Call(command).code, AnyOf(0, 1)) << command << content.substr(0, 80);
     }
+    const auto told = Call("merge s"), quiet = Call("merge s --quiet");
+    EXPECT_EQ(quiet.code, told.code);
+    EXPECT_NE(told.out, "");
+    EXPECT_EQ(quiet.out, "");
     fs::remove_all(folder_ / "new");
   }
 }
