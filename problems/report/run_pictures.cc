@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/report/run_pictures.h"
 
+#include <cmath>
+#include <vector>
+
 #include "problems/report/pictures/lighting.h"
 #include "problems/report/pictures/pictures.h"
 #include "problems/report/pictures/render.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/mesh/mesh_primitives.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {
@@ -152,6 +156,70 @@ void WriteFaceOverSkull(Album& album) {
   WriteSheet("pictures/face_over_skull.png", over, Lighting::kStudio, album.of_skull, album);
 }
 
+// The way on the face from one (u,v) to another, a little above it. u may lead over the seam.
+std::vector<Vec3> WayOnFace(const HSplineSurface& face, const Vec2& from, const Vec2& to) {
+  constexpr int kParts = 12;
+  constexpr double kAbove_mm = 0.6;
+  const bool is_closed = face.shape().ClosedU();
+  Vec2 step = to - from;
+  step.x() -= is_closed ? std::round(step.x()) : 0;
+  std::vector<Vec3> way;
+  for (int k = 0; k <= kParts; ++k) {
+    Vec2 uv = from + k * step / kParts;
+    uv.x() -= is_closed ? std::floor(uv.x()) : 0;
+    const SurfaceFrame frame = face.Frame(uv);
+    way.emplace_back(frame.point + kAbove_mm * frame.Normal());
+  }
+  return way;
+}
+
+// The ways of the markers' (u,v) in the last round.
+SceneObject WaysObject(const RunResult& result) {
+  constexpr double kShown_mm = 0.3;  // shorter ways would be hidden by their end
+  SceneObject ways{.mesh = {}, .material = PlasticMaterial(HexColour(0xe0a030))};
+  for (std::size_t k = 0; k < result.target.points.size(); ++k) {
+    const FitPoint& point = result.target.points[k];
+    if (point.role == PointRole::kSeed) {
+      continue;
+    }
+    const std::vector<Vec3> way = WayOnFace(result.fit.surface, point.uv, result.fit.uv[k]);
+    if ((way.back() - way.front()).norm() >= kShown_mm) {
+      for (std::size_t n = 1; n < way.size(); ++n) {
+        Append(ways.mesh, MakeCylinder(way[n - 1], way[n], 0.7));
+      }
+      Append(ways.mesh, MakeSphere(way.back(), 1.4));
+    }
+  }
+  return ways;
+}
+
+SceneObject SeedsObject(const RunResult& result) {
+  SceneObject seeds{.mesh = {}, .material = PlasticMaterial(HexColour(0x2f7fc1))};
+  for (const FitPoint& point : result.target.points) {
+    if (point.role == PointRole::kSeed) {
+      Append(seeds.mesh, MakeSphere(point.position, 0.8));
+    }
+  }
+  return seeds;
+}
+
+// The translucent face with the points of its fit. Skipped if nothing was fitted.
+void WriteFit(Album& album) {
+  const RunResult& result = album.result;
+  if (result.fit.levels.empty()) {
+    return;
+  }
+  Scene scene{{DowelObject(result.subject.dowels_on_bone)}};
+  for (const SceneObject& object : {SeedsObject(result), WaysObject(result)}) {
+    if (!object.mesh.triangles.empty()) {
+      scene.objects.push_back(object);
+    }
+  }
+  scene.objects.push_back(SkinObject(result.face.mesh, 0.6));
+  ShadowMaps shadows;
+  WriteSheet("pictures/fit.png", scene, Lighting::kStudio, shadows, album);
+}
+
 void WriteSigma(Album& album) {
   const auto& uncertainty = album.result.uncertainty;
   if (!uncertainty || uncertainty->sigma_mm.empty()) {
@@ -226,6 +294,7 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
   }
   WriteOrigin(album);
   WriteFaceOverSkull(album);
+  WriteFit(album);
   WriteSigma(album);
   if (result.truth) {
     overview.push_back(WriteTruth(album));

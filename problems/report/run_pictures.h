@@ -26,9 +26,9 @@ std::vector<double> SignedErrors(const TriMesh& mesh, const RunResult& result,
 Scene HeadScene(const RunResult& result);
 
 // Writes pictures/overview.png and, from front, three quarters and side, skull_dowels, depth,
-// implicit, face and face_over_skull. Writes bust, origin and sigma if the run has them, and truth,
-// scored and error (on the true skin) if the true skin is known. Captions and legends are in the
-// report (run_report.h), not in the pictures.
+// implicit, face and face_over_skull. Writes fit, bust, origin and sigma if the run has them, and
+// truth, scored and error (on the true skin) if the true skin is known. Captions and legends are in
+// the report (run_report.h), not in the pictures.
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context);
 
 }  // namespace semblance::problems

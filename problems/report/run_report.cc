@@ -8,6 +8,7 @@
 #include <cmath>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "problems/config/config.h"
 #include "problems/report/plain_names.h"
@@ -34,6 +35,8 @@ std::string Number(const Json& value, int digits = 2) {
   }
   return value.is_null() ? "" : value.is_string() ? value.get<std::string>() : value.dump();
 }
+
+double NumberOrNan(const Json& value) { return value.is_number() ? value.get<double>() : kNaN; }
 
 std::string Percent(const Json& share) {
   return share.is_null() ? "" : TablePercent(share.get<double>());
@@ -130,7 +133,7 @@ ReportTable MetricsTable(const std::string& caption, const Json& metrics) {
 std::vector<double> Numbers(const Json& list) {
   std::vector<double> numbers;
   for (const Json& value : list) {
-    numbers.push_back(value.is_number() ? value.get<double>() : kNaN);
+    numbers.push_back(NumberOrNan(value));
   }
   return numbers;
 }
@@ -193,17 +196,17 @@ ReportTable FeaturesTable(const Json& fit) {
 }
 
 ReportTable LevelsTable(const Json& fit) {
-  ReportTable table{
-      "Steps of the schedule",
-      {"step", "level", "fraction", "RMS before (mm)", "RMS after (mm)", "largest move (mm)",
-       "rank of the data", "vertices free", "vertices without data", "patches without data"}};
+  ReportTable table{"Steps of the schedule",
+                    {"step", "level", "fraction", "RMS before (mm)", "RMS after (mm)",
+                     "largest move (mm)", "rank of the data", "vertices free", "vertices moved",
+                     "vertices without data", "patches without data"}};
   int step = 0;
   for (const Json& level : fit.at("levels")) {
     table.AddRow(++step, Number(level.at("level")), Number(level.at("fraction")),
                  Number(level.at("rms_before_mm")), Number(level.at("rms_after_mm")),
                  Number(level.at("max_move_mm")), Number(level.at("rank")),
-                 Number(level.at("free_vertices")), Number(level.at("uncovered_vertices")),
-                 OutOf(level, "empty_patches", "patches"));
+                 Number(level.at("free_vertices")), Number(level.value("moved_vertices", Json())),
+                 Number(level.at("uncovered_vertices")), OutOf(level, "empty_patches", "patches"));
   }
   return table;
 }
@@ -457,12 +460,100 @@ ReportTable PlausibilityTable(const Json& result) {
   return table;
 }
 
-ReportSection FitSection(const Json& fit) {
-  return {.heading = "The fit",
-          .images = ConvergencePlots(fit),
-          .tables = WithoutEmptyTables({LevelsTable(fit), RelaxationTable(fit), FeaturesTable(fit),
-                                        CountsTable("Counts of the fit", fit)}),
-          .folded = true};
+// The cost of each term before and after each solve, and their sum.
+ReportTable CostsTable(const Json& fit) {
+  ReportTable table{"What each solve made least: weight times mean square, before and after it",
+                    {"step", "level", "term", "cost before (mm²)", "cost after (mm²)"}};
+  int step = 0;
+  for (const Json& level : fit.at("levels")) {
+    ++step;
+    double before = 0, after = 0;
+    for (const Json& term : level.at("terms")) {
+      table.AddRow(step, Number(level.at("level")), WordsOfKey(term.at("term").get<std::string>()),
+                   Number(term.at("before"), 4), Number(term.at("after"), 4));
+      before += NumberOrNan(term.at("before"));
+      after += NumberOrNan(term.at("after"));
+    }
+    if (level.at("terms").size() > 1) {
+      table.AddRow(step, Number(level.at("level")), "all terms", TableNumber(before, 4),
+                   TableNumber(after, 4));
+    }
+  }
+  return table;
+}
+
+// The largest move of a point's (u,v) over the face; 0 without relaxation.
+double LargestRelaxation_mm(const Json& fit) {
+  double largest = 0;
+  for (const Json& moves : fit.value("relaxations", Json::array())) {
+    largest = std::max(largest, NumberOrNan(moves.at("max_move_mm")));
+  }
+  return largest;
+}
+
+std::string PointsSentence(const Json& fit) {
+  const int seeds = fit.at("seeds").get<int>();
+  const double moved_mm = LargestRelaxation_mm(fit);
+  return fmt::format(
+      "{} depth markers and {} extra points (seeds) of the first face drew the surface{}.",
+      fit.at("points").get<int>() - seeds, seeds,
+      moved_mm > 0
+          ? fmt::format("; relaxation moved their places on it by up to {:.1f} mm", moved_mm)
+          : "; their places on it did not move");
+}
+
+// Empty if no step needed a hold (FitLevel).
+std::string HoldSentence(const Json& fit) {
+  double hold = 0;
+  for (const Json& level : fit.at("levels")) {
+    hold = std::max(hold, level.value("hold", 0.0));
+  }
+  return hold > 0 ? fmt::format(
+                        " The points alone hardly determined some of the vertices; a hold "
+                        "of weight {:.0e} kept them near their places.",
+                        hold)
+                  : "";
+}
+
+std::string FitSentence(const Json& fit) {
+  const Json& levels = fit.at("levels");
+  if (levels.empty()) {
+    return "No control vertex was solved for. The face is the face model's or the placed "
+           "template's (option face), and its distances from the markers were measured.";
+  }
+  std::set<int> named;
+  std::set<std::string> solvers;
+  for (const Json& level : levels) {
+    named.insert(level.at("level").get<int>());
+    solvers.insert(level.at("solver").get<std::string>());
+  }
+  return fmt::format(
+      "The last round took {} at level{} {} of the H-spline, solved by {}. Each step moved the "
+      "control vertices by its fraction of the way to the solution. {}{}",
+      Counted(std::ssize(levels), "step", "steps"), named.size() == 1 ? "" : "s",
+      fmt::join(named, ", "), fmt::join(solvers, " and "), PointsSentence(fit), HoldSentence(fit));
+}
+
+ReportSection FitSection(const Json& fit, const OutputFolder& folder) {
+  ReportSection section{
+      .heading = "How the face was fitted",
+      .paragraphs = {FitSentence(fit)},
+      .tables = WithoutEmptyTables({LevelsTable(fit), CostsTable(fit), RelaxationTable(fit),
+                                    FeaturesTable(fit), CountsTable("Counts of the fit", fit)}),
+      .folded = true};
+  const std::filesystem::path picture = folder.Root() / "pictures/fit.png";
+  if (!fit.at("levels").empty() && std::filesystem::exists(picture)) {  // not of older versions
+    section.images.push_back(ReportImageFromFile(
+        picture,
+        "Points of the fit: depth markers (red), extra points on the first face (blue), and the "
+        "ways of the markers' places over the face in the last round (yellow, with a ball at the "
+        "end).",
+        "from three sides: the translucent face with the points that it was fitted to"));
+  }
+  for (ReportImage& plot : ConvergencePlots(fit)) {
+    section.images.push_back(std::move(plot));
+  }
+  return section;
 }
 
 ReportSection ProvenanceSection(const std::filesystem::path& file) {
@@ -495,7 +586,7 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
   sections.push_back({.heading = "Depth at the landmarks",
                       .tables = {DowelsTable(folder.Root() / "dowels.csv")},
                       .folded = true});
-  sections.push_back(FitSection(result.at("fit")));
+  sections.push_back(FitSection(result.at("fit"), folder));
   if (HasSigma(result)) {
     sections.push_back(UncertaintySection(result, folder));
   }
