@@ -50,9 +50,11 @@ void Fields(Visitor& visit, FitOptions& o) {
                        "are the control vertices; where the terms treat x, y and z alike, one "
                        "coordinate of 3 x 3 of them; fastest: one direct factorisation of the same "
                        "least squares where the terms are linear, or a loss is on terms that treat "
-                       "x, y and z alike; else as ceres. Both give the same surface to rounding. "
-                       "The auto plan uses conjugate gradients; with ceres a last problem over the "
-                       "vertices that it found brings all terms to their minimum"},
+                       "x, y and z alike; else as ceres. Level by level both give the same "
+                       "surface to rounding; by the adaptive plan, whose solves before the "
+                       "last are loose, the surfaces of one fit differed by 0.014 mm. The auto "
+                       "plan uses conjugate gradients; with ceres a last problem over the vertices "
+                       "that it found brings all terms to their minimum"},
       o.solver);
 }
 
