@@ -15,17 +15,34 @@ namespace {
 // In patches. A smaller reach may move no vertex; a larger one moves most of a face.
 constexpr double kLeastReach = 1, kMostReach = 8;
 
-void Check(const Pull& pull, const HSplineSurface& face) {
-  if (pull.level < 0 || pull.level > face.shape().max_level) {
-    throw InputError(fmt::format("pull: the face has no level {}; its levels are 0 to {}",
-                                 pull.level, face.shape().max_level));
+// Throws InputError for a place that the face lacks. what: "pull" or "brush".
+template <class Edit>
+void CheckPlace(const Edit& edit, const HSplineSurface& face, const char* what) {
+  if (edit.level < 0 || edit.level > face.shape().max_level) {
+    throw InputError(fmt::format("{}: the face has no level {}; its levels are 0 to {}", what,
+                                 edit.level, face.shape().max_level));
   }
+  if (!(edit.reach >= kLeastReach && edit.reach <= kMostReach)) {
+    throw InputError(fmt::format("{}: a reach of {} patches; give {} to {}", what, edit.reach,
+                                 kLeastReach, kMostReach));
+  }
+}
+
+void Check(const Pull& pull, const HSplineSurface& face) {
+  CheckPlace(pull, face, "pull");
   if (!pull.uv.allFinite() || !pull.by_mm.allFinite() || pull.by_mm.norm() > 1000) {
     throw InputError("pull: (u,v) and the way must be finite, and the way at most 1000 mm long");
   }
-  if (!(pull.reach >= kLeastReach && pull.reach <= kMostReach)) {
-    throw InputError(fmt::format("pull: a reach of {} patches; give {} to {}", pull.reach,
-                                 kLeastReach, kMostReach));
+}
+
+void Check(const Brush& brush, const HSplineSurface& face) {
+  CheckPlace(brush, face, "brush");
+  constexpr double kMostInflation_mm = 20;
+  const bool inflates = brush.kind == BrushKind::kInflate;
+  const double low = inflates ? -kMostInflation_mm : 0, high = inflates ? kMostInflation_mm : 1;
+  if (!brush.uv.allFinite() || !(brush.strength >= low && brush.strength <= high)) {
+    throw InputError(fmt::format("brush: a strength of {} at ({}, {}); give {} to {}",
+                                 brush.strength, brush.uv.x(), brush.uv.y(), low, high));
   }
 }
 
@@ -109,6 +126,58 @@ std::map<VertexId, std::optional<Vec3>> SumMoves(const ControlNet& before, const
   return moves;
 }
 
+// The mean of a vertex's neighbours in its net, two or more.
+Vec3 MeanOfNeighbours(const ControlNet& net, int i, int j, bool closed_u) {
+  Vec3 sum = Vec3::Zero();
+  int count = 0;
+  const auto add = [&](int column, int row) {
+    const int wrapped = closed_u ? (column + net.columns) % net.columns : column;
+    if (wrapped >= 0 && wrapped < net.columns && row >= 0 && row < net.rows) {
+      sum += net.At(wrapped, row);
+      ++count;
+    }
+  };
+  add(i - 1, j);
+  add(i + 1, j);
+  add(i, j - 1);
+  add(i, j + 1);
+  return sum / count;
+}
+
+// The move of a vertex at the centre of the brush by strength 1 (inflate: 1 mm). uv: the centre.
+Vec3 BrushMove(const Brush& brush, const HSplineSurface& face, const ControlNet& net, int i, int j,
+               const Vec2& uv) {
+  const Vec3& vertex = net.At(i, j);
+  switch (brush.kind) {
+    case BrushKind::kSmooth:
+      return MeanOfNeighbours(net, i, j, face.shape().ClosedU()) - vertex;
+    case BrushKind::kInflate:
+      return face.Normal(GrevillePoint(face.shape(), {brush.level, i, j}));
+    case BrushKind::kFlatten: {
+      const Vec3 normal = face.Normal(uv);
+      return -(vertex - face.Point(uv)).dot(normal) * normal;
+    }
+  }
+  return Vec3::Zero();
+}
+
+// `script` with the edits that change the net of a level of `face` from `before` to `after`.
+EditScript WithNet(const HSplineSurface& face, int level, const ControlNet& before,
+                   const ControlNet& after, const EditScript& script) {
+  if (level == 0) {
+    return WithOffsets(script, SumMoves(before, after, script));
+  }
+  HSplineSurface changed = face;
+  changed.SetNet(level, after);
+  std::map<VertexId, std::optional<Vec3>> offsets;
+  for (const auto& [vertex, offset] : changed.Offsets(level)) {
+    if (face.Offset(vertex) != offset) {
+      offsets[vertex] = offset;
+    }
+  }
+  return WithOffsets(script, offsets);
+}
+
 }  // namespace
 
 Vec3 FindLeft(const HSplineSurface& face) {
@@ -145,18 +214,28 @@ EditScript Pulled(const Pull& pull, const HSplineSurface& face, const EditScript
     const double moved = MoveAt(face.StencilAt(pull.level, pull.uv), shares);
     MoveBy(shares, pull.by_mm / moved, after);
   }
-  if (pull.level == 0) {
-    return WithOffsets(script, SumMoves(before, after, script));
-  }
-  HSplineSurface pulled = face;
-  pulled.SetNet(pull.level, after);
-  std::map<VertexId, std::optional<Vec3>> changed;
-  for (const auto& [vertex, offset] : pulled.Offsets(pull.level)) {
-    if (face.Offset(vertex) != offset) {
-      changed[vertex] = offset;
+  return WithNet(face, pull.level, before, after, script);
+}
+
+EditScript Brushed(const Brush& brush, const HSplineSurface& face, const EditScript& script) {
+  Check(brush, face);
+  const ControlNet before = face.Net(brush.level);
+  ControlNet after = before;
+  const Vec2 other_uv(1 - brush.uv.x(), brush.uv.y());
+  const auto own = SharesAround(face.shape(), brush.level, brush.uv, brush.reach);
+  const auto other = SharesAround(face.shape(), brush.level, other_uv, brush.reach);
+  for (int j = 0; j < before.rows; ++j) {
+    for (int i = 0; i < before.columns; ++i) {
+      const std::size_t k = i + static_cast<std::size_t>(before.columns) * j;
+      const bool is_other = brush.mirror && other[k] > own[k];
+      const double share = is_other ? other[k] : own[k];
+      if (share > 0) {
+        after.vertices[k] += share * brush.strength *
+                             BrushMove(brush, face, before, i, j, is_other ? other_uv : brush.uv);
+      }
     }
   }
-  return WithOffsets(script, changed);
+  return WithNet(face, brush.level, before, after, script);
 }
 
 }  // namespace semblance::problems

@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "problems/face/template_face.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/random.h"
@@ -89,6 +91,67 @@ TEST(Pull, MirroredBothSidesMoveAlike) {
 
 TEST(Pull, LeftIsTheSubjectsLeft) {
   EXPECT_LT((FindLeft(MakeTemplateFace({}).surface) - Vec3(1, 0, 0)).norm(), 1e-6);
+}
+
+HSplineSurface AfterBrush(const Brush& brush, const HSplineSurface& face) {
+  HSplineSurface after = face;
+  ApplyEdits(Brushed(brush, face, {}), after);
+  return after;
+}
+
+TEST(Brush, InflatesAlongTheNormalByItsStrength) {
+  const HSplineSurface before = MakeTemplateFace({}).surface;
+  const Vec2 uv(0.62, 0.45);
+  for (const double mm : {2.0, -2.0}) {
+    const HSplineSurface after = AfterBrush(
+        {.kind = BrushKind::kInflate, .level = 0, .uv = uv, .strength = mm, .reach = 8}, before);
+    const double moved = (after.Point(uv) - before.Point(uv)).dot(before.Normal(uv)) / mm;
+    EXPECT_GT(moved, 0.5);
+    EXPECT_LE(moved, 1 + 1e-9);
+  }
+}
+
+TEST(Brush, SmoothingShortensTheDistanceFromTheNeighbours) {
+  const HSplineSurface before = RandomSurface(kPulledShape, 8);
+  const auto roughness = [](const HSplineSurface& face) {
+    const ControlNet net = face.Net(2);
+    double sum = 0;
+    for (int j = 8; j < 14; ++j) {
+      for (int i = 10; i < 16; ++i) {
+        sum += (net.At(i - 1, j) + net.At(i + 1, j) + net.At(i, j - 1) + net.At(i, j + 1) -
+                4 * net.At(i, j))
+                   .squaredNorm();
+      }
+    }
+    return sum;
+  };
+  const HSplineSurface after =
+      AfterBrush({.level = 2, .uv = {0.5, 0.5}, .strength = 0.5, .reach = 4}, before);
+  EXPECT_LT(roughness(after), 0.7 * roughness(before));
+}
+
+TEST(Brush, FlatteningBringsVerticesToTheTangentPlane) {
+  const HSplineSurface before = MakeTemplateFace({}).surface;
+  const Vec2 uv(0.6, 0.5);
+  const HSplineSurface after = AfterBrush(
+      {.kind = BrushKind::kFlatten, .level = 0, .uv = uv, .strength = 1, .reach = 8}, before);
+  const Vec3 point = before.Point(uv), normal = before.Normal(uv);
+  for (const Vec2& beside : {Vec2(0.63, 0.5), Vec2(0.57, 0.52), Vec2(0.6, 0.46)}) {
+    EXPECT_LT(std::abs((after.Point(beside) - point).dot(normal)),
+              std::abs((before.Point(beside) - point).dot(normal)) + 1e-9);
+  }
+}
+
+TEST(Brush, WithoutStrengthChangesNothingAndBeyondItsRangeIsRefused) {
+  const HSplineSurface face = RandomSurface(kPulledShape, 6);
+  const Vec2 uv(0.4, 0.5);
+  for (const BrushKind kind : {BrushKind::kSmooth, BrushKind::kInflate, BrushKind::kFlatten}) {
+    const HSplineSurface same = AfterBrush({.kind = kind, .uv = uv, .strength = 0}, face);
+    EXPECT_EQ(same.Point(uv), face.Point(uv));
+    EXPECT_THROW(Brushed({.kind = kind, .uv = uv, .strength = 21}, face, {}), InputError);
+    EXPECT_THROW(Brushed({.kind = kind, .uv = uv}, face, {}), InputError);
+  }
+  EXPECT_THROW(Brushed({.uv = uv, .strength = -0.1}, face, {}), InputError);
 }
 
 TEST(Pull, WhatCannotBeIsRefused) {
