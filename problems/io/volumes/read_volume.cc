@@ -647,6 +647,28 @@ std::vector<fs::path> FindVoxelFiles(const fs::path& path) {
 
 }  // namespace
 
+std::vector<VolumeSeries> ListSeries(const fs::path& path, const RunContext& context) {
+  std::vector<VolumeSeries> found;
+  if (!fs::is_directory(path)) {
+    return found;
+  }
+  std::vector<std::string> notes;
+  for (const DicomSeries& series :
+       GroupSeries(ScanDicomInChild(VolumeFiles(path), context.stop_token), notes)) {
+    const DicomHeader& first = series.First();
+    if (series.slices.size() >= 2) {
+      found.push_back({.name = series.name,
+                       .description = CleanDicomText(first.description),
+                       .modality = CleanDicomText(first.modality),
+                       .slices = static_cast<int>(series.slices.size()),
+                       .columns = first.columns,
+                       .rows = first.rows});
+    }
+  }
+  std::ranges::stable_sort(found, std::ranges::greater(), &VolumeSeries::slices);
+  return found;
+}
+
 std::optional<VolumeFormat> FindVolumeFormat(const fs::path& path) {
   const std::string name = LowerCaseName(path);
   for (const Ending& ending : kEndings) {

@@ -36,6 +36,17 @@ struct VolumeReading {
 VolumeReading ReadVolume(const std::filesystem::path& path, const ReadVolumeOptions& options,
                          const RunContext& context);
 
+// A series of a DICOM folder, for a person who chooses one.
+struct VolumeSeries {
+  std::string name;  // for ReadVolumeOptions::series
+  std::string description, modality;
+  int slices = 0, columns = 0, rows = 0;
+};
+
+// The series of a DICOM folder with at least two slices, those with the most slices first; none for
+// a file. Throws as ReadVolume.
+std::vector<VolumeSeries> ListSeries(const std::filesystem::path& path, const RunContext& context);
+
 // The format of a file with a whole volume, by the ending of its name; empty for other endings.
 std::optional<VolumeFormat> FindVolumeFormat(const std::filesystem::path& file);
 
