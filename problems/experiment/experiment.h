@@ -235,8 +235,26 @@ constexpr auto EnumNames(InsertedUv) {
 
 using Subject = std::variant<PhantomOptions, FileSubject, CtSubject>;
 
+// Facts about the case that the report repeats. They change no face.
+struct CaseRecord {
+  std::string number;
+  std::string age;
+  std::string notes;
+};
+template <class Visitor>
+void Fields(Visitor& visit, CaseRecord& o) {
+  visit(FieldInfo{.name = "number", .doc = "number of the case in its register"}, o.number);
+  visit(
+      FieldInfo{.name = "age",
+                .doc = "age of the person in words, e.g. 35 to 50 years; for a table whose depths "
+                       "depend on age, set tissue.given.age_years too"},
+      o.age);
+  visit(FieldInfo{.name = "notes", .doc = "remarks on the case"}, o.notes);
+}
+
 struct Experiment {
   std::string title = "untitled";
+  CaseRecord record;
   Subject subject;
   PlaceOptions landmarks;
   TissueOptions tissue;
@@ -271,6 +289,8 @@ struct Experiment {
 template <class Visitor>
 void Fields(Visitor& visit, Experiment& o) {
   visit(FieldInfo{.name = "title", .doc = "title of the report"}, o.title);
+  visit(FieldInfo{.name = "record", .doc = "facts about the case; the report repeats them"},
+        o.record);
   visit(FieldInfo{.name = "subject", .doc = "whose skull, and the true face where it is known"},
         o.subject);
   visit(FieldInfo{.name = "landmarks", .doc = "how landmarks are laid onto bone"}, o.landmarks);
@@ -308,7 +328,7 @@ void Fields(Visitor& visit, Experiment& o) {
                          "then the H-spline of its mean; ict is the one of `template: ict`"},
         o.prior);
   visit(FieldInfo{.name = "face",
-                  .doc = "the way to the face; auto: prior_then_fit if there is a prior of the "
+                  .doc = "the method; auto: prior_then_fit if there is a prior of the "
                          "template, else fit; placed: the template, brought to the dowels; "
                          "thin_plate: the template, bent to their tips; fit: the template, fitted "
                          "to tips and implicit face level by level; prior: the most likely face of "

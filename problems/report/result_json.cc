@@ -389,9 +389,14 @@ double MarkerRms_mm(const RunResult& result) {
   return count > 0 ? std::sqrt(squares / count) : kNaN;
 }
 
+Json RecordJson(const CaseRecord& record) {
+  return {{"number", record.number}, {"age", record.age}, {"notes", record.notes}};
+}
+
 Json ResultJson(const Experiment& experiment, const RunResult& result) {
   Json json = {{"title", experiment.title},
                {"subject", result.subject.name},
+               {"record", RecordJson(experiment.record)},
                {"usable", result.usable()},
                {"faults", result.Faults()},
                {"plausibility", PlausibilityToJson(result.plausibility)}};

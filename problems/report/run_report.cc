@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
 
 #include "problems/config/config.h"
 #include "problems/report/plain_names.h"
@@ -629,11 +630,26 @@ std::vector<ReportImage> ScoreImages(const Json& face, const OutputFolder& folde
   return images;
 }
 
+// "Case 2026-17. Age: 35 to 50 years. Notes." with what the record states. Folders of older
+// versions have no record.
+std::string RecordText(const Json& record) {
+  std::string text;
+  for (const auto& [key, label] :
+       {std::pair("number", "Case "), std::pair("age", "Age: "), std::pair("notes", "")}) {
+    const std::string stated = record.value(key, "");
+    if (!stated.empty()) {
+      text += fmt::format(" {}{}{}", label, stated, stated.ends_with('.') ? "" : ".");
+    }
+  }
+  return text;
+}
+
 Report BuildReport(const Json& result, const OutputFolder& folder) {
   Report report;
   report.title = result.at("title").get<std::string>();
   report.subtitle = "Facial approximation of " + result.at("subject").get<std::string>() +
-                    ". An approximation, not an identification.";
+                    ". An approximation, not an identification." +
+                    RecordText(result.value("record", Json::object()));
   report.faults = result.value("faults", std::vector<std::string>());
   report.notes = SortedNotes(result.at("notes").get<std::vector<std::string>>());
   report.tiles = Tiles(result);
