@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/app/all_commands.h"
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -63,17 +62,9 @@ BenchOptions MakeBenchOptions(const WorkbenchArguments& a) {
 // can see the arguments of a command.
 void OpenBrowser(const fs::path& folder, const std::string& url) {
   const std::string file = (folder / ".semblance-workbench" / "open.html").string();
-  const std::string page =
-      fmt::format("<!DOCTYPE html><meta http-equiv=\"refresh\" content=\"0; url={}\">\n", url);
-  ::unlink(file.c_str());
-  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
-  const bool written = descriptor >= 0 && ::write(descriptor, page.data(), page.size()) ==
-                                              static_cast<ssize_t>(page.size());
-  ::close(descriptor);
-  if (!written) {
-    throw IoError(
-        fmt::format("{}: cannot be written; open the address in the browser yourself", file));
-  }
+  WriteSecret(
+      file,
+      fmt::format("<!DOCTYPE html><meta http-equiv=\"refresh\" content=\"0; url={}\">\n", url));
   if (::fork() == 0) {
     ::execlp("xdg-open", "xdg-open", file.c_str(), nullptr);
     ::_exit(127);
@@ -97,12 +88,32 @@ std::unique_ptr<Bench> OpenBench(const BenchOptions& options) {
   }
 }
 
+// Listens at the folder's last address, so that a page that is still open goes on. If its port is
+// taken meanwhile, another one is used. port: 0 for any.
+std::unique_ptr<HttpServer> Listen(Bench& bench, int port) {
+  const BenchAddress last = ReadAddress(bench.Folder());
+  HttpServerOptions options{.port = port != 0 ? port : last.port,
+                            .token = last.token.empty() ? RandomToken() : last.token,
+                            .limits = {}};
+  std::unique_ptr<HttpServer> server;
+  try {
+    server = std::make_unique<HttpServer>(bench, options);
+  } catch (const IoError&) {
+    if (port != 0 || last.port == 0) {
+      throw;
+    }
+    options.port = 0;
+    server = std::make_unique<HttpServer>(bench, options);
+  }
+  StoreAddress(bench.Folder(), {server->Port(), options.token});
+  return server;
+}
+
 int Workbench(const WorkbenchArguments& a) {
   const std::unique_ptr<Bench> opened = OpenBench(MakeBenchOptions(a));
   Bench& bench = *opened;
-  HttpServerOptions listening;
-  listening.port = a.port;
-  HttpServer server(bench, listening);
+  const std::unique_ptr<HttpServer> listening = Listen(bench, a.port);
+  HttpServer& server = *listening;
   Tell(
       "folder: {}\nopen in a browser on this machine: {}\nCtrl-C ends the program; nothing is "
       "lost\n",

@@ -2,12 +2,11 @@
 // The options that lead to a face: the few that matter most, single depths, and all others.
 import {controlAt, tree} from './controls.js';
 import {button, check, element, field, group, lines} from './dom.js';
-import {FACE_FORMATS, act, download, nameOf, store} from './store.js';
+import {isStated} from './person_panel.js';
+import {act, nameOf, store} from './store.js';
 
-const MAIN = [['tissue.depths', 'depths from'], ['tissue.table', 'table'], ['tissue.fill_from', 'missing depths from'],
-              ['tissue.sex', 'sex'], ['tissue.build', 'build'], ['template', 'template'], ['face', 'method'],
-              ['interp', 'interpolation']];
-const HIDDEN = ['subject', 'title', 'edits', 'base'];
+const MAIN = [['tissue.depths', 'depths from'], ['template', 'template'], ['face', 'method'], ['interp', 'interpolation']];
+const HIDDEN = ['subject', 'title', 'record', 'edits', 'base'];
 
 function stateLine(faces) {
   const {kind, words, seconds, change, coloured} = faces;
@@ -34,7 +33,8 @@ function depthRow(dowel, faces) {
       isSet ? button('\u21ba', () => act('unset', {path}), {className: 'reset', title: 'back to the depth of the table or the measurement'}) : element('i'));
 }
 
-export function facePanel({faces, scene}) {
+export function facePanel(bench) {
+  const {faces, scene} = bench, show = (name) => bench.show(name), person = element('div');
   const line = element('div'), main = element('div'), depths = element('div', {className: 'depths'}), notes = element('div');
   const all = element('div'), search = element('input', {type: 'search', placeholder: 'find an option'});
   const colour = element('input', {type: 'checkbox', onchange: () => faces.colour(colour.checked)});
@@ -42,13 +42,10 @@ export function facePanel({faces, scene}) {
   const clear = element('input', {type: 'range', min: 0.1, max: 1, step: 0.05, value: scene.shared.layers.get('face').opacity,
                                   oninput: () => { scene.shared.layers.get('face').opacity = Number(clear.value); scene.update(); }});
   search.setAttribute('aria-label', 'find an option');
-  const format = element('select', {}, ...FACE_FORMATS.map((ending) => element('option', {value: ending, textContent: ending})));
-  format.setAttribute('aria-label', 'kind of file');
-  const save = element('div', {className: 'row'}, 'Save the full face as', format, button('Save', () => download('export', {format: format.value})));
-  const root = element('div', {}, line,
+  const root = element('div', {}, person, line,
       group('Show', check('Colour the last change', colour), check('Compare with the present face from now on', pin), field('opacity of the face', clear)),
       group('Main options', main), element('details', {open: true}, element('summary', {textContent: 'Depths, mm'}), depths),
-      element('details', {}, element('summary', {textContent: 'All options'}), search, all), notes, save);
+      element('details', {}, element('summary', {textContent: 'All options'}), search, all), notes);
 
   const drawDepths = () => {
     if (document.activeElement && depths.contains(document.activeElement) && document.activeElement.type === 'range' && faces.busy) { return; }
@@ -64,7 +61,6 @@ export function facePanel({faces, scene}) {
   };
   const drawFace = () => {
     line.replaceChildren(stateLine(faces), lines(faces.faults.map(({fault}) => `Not usable: ${fault}`), 'bad') || '');
-    save.hidden = faces.kind !== 'full';
     notes.replaceChildren(faces.notes.length ? element('details', {}, element('summary', {textContent: `Notes (${faces.notes.length})`}),
                                                        lines(faces.notes, 'soft')) : '');
     drawDepths();
@@ -76,6 +72,8 @@ export function facePanel({faces, scene}) {
     show: drawFace,
     state: (state, former) => {
       if (former && former.revision === state.revision) { return; }
+      person.replaceChildren(isStated(state) ? '' : element('p', {className: 'hint'}, 'This face assumes a male of normal build. ',
+          button('State the person', () => show('person'))));
       main.replaceChildren(...MAIN.map(([path, name]) => controlAt(path, name)).filter((made) => made));
       drawAll();
     }

@@ -6,12 +6,17 @@ import {act, refresh, showMessage, store} from './store.js';
 const NAMES = {run: 'Full face', propose: 'Proposal', open: 'Opening', variants: 'Variants'};
 const EVERY_MS = 400;
 
+// The link to the report of the last run; marked if the report belongs to another state.
+export const reportLink = ({saved}) => element('a', {href: 'run/report.html', target: '_blank', rel: 'noopener', className: saved ? '' : 'stale',
+    textContent: saved ? 'Report' : 'Report (out of date)', title: saved ? '' : 'The case has changed since this report was made; make the face again.'});
+
 export class Job {
-  constructor(root, runButton) {
+  constructor(root, runButton, progress) {
     this.root = root;
     this.timer = null;
     this.runButton = runButton;
-    runButton.addEventListener('click', () => act('run'));
+    this.progress = progress;
+    this.steps = [];  // of the running job: [{step, from}], from: its start in seconds
   }
 
   state(state) {
@@ -21,6 +26,7 @@ export class Job {
     this.runButton.textContent = face.saved ? 'The full face is made' : 'Make the full face';
     this.runButton.classList.toggle('primary', !face.saved);
     this.show(job, face);
+    this.showSteps(job, runs);
     if (runs && !this.timer) {
       this.timer = setInterval(() => refresh().catch((error) => { this.stop(); showMessage(error.message); }), EVERY_MS);
     }
@@ -30,6 +36,20 @@ export class Job {
   stop() {
     clearInterval(this.timer);
     this.timer = null;
+  }
+
+  // Lists the steps of the running job: the ended ones with their duration, the present one with its progress.
+  showSteps(job, runs) {
+    if (!runs) { this.steps = []; }
+    const step = job.step.split(',')[0];  // without the round of a step
+    if (runs && (!this.steps.length || this.steps.at(-1).step !== step)) { this.steps.push({step, from: job.seconds}); }
+    this.progress.hidden = !runs;
+    this.progress.replaceChildren(...this.steps.map(({step: name, from}, n) => {
+      const next = this.steps[n + 1], part = job.fraction !== null && !next ? `, ${Math.round(100 * job.fraction)} %` : '';
+      return element('li', {className: next ? 'done' : ''}, name,
+                     element('small', {textContent: `${((next ? next.from : job.seconds) - from).toFixed(1)} s${part}`}));
+    }));
+    this.progress.scrollTop = this.progress.scrollHeight;
   }
 
   show(job, face) {
@@ -46,9 +66,7 @@ export class Job {
     } else if (job.state === 'done' && job.name === 'propose') {
       parts.push(element('span', {textContent: job.words}));
     }
-    if (face.saved) {
-      parts.push(element('a', {href: 'run/report.html', target: '_blank', rel: 'noopener', textContent: 'Report'}));
-    }
+    if (face.there) { parts.push(reportLink(face)); }
     this.root.replaceChildren(...parts);
   }
 }

@@ -88,7 +88,7 @@ async function confirm(code) {
 
 function detail(code) {
   if (!code) {
-    return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. Click on a ball to choose its site.'})];
+    return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. Click on a ball to choose its site; drag a ball to move it. Keys: P places the site in the middle of the view, W A S D move it by 1 mm (with Shift 0.2 mm), Enter confirms it, N goes to the next, Delete removes it.'})];
   }
   const site = siteOf(code), landmark = landmarkOf(code);
   const checks = landmark ? Object.keys(MEANINGS).filter((check) => landmark[check] !== null && landmark[check] !== undefined)
@@ -108,7 +108,7 @@ function detail(code) {
         button('Next open site', () => choose(nextOpen(code)), {title: 'N'})),
     landmark ? field('rename to', select(names, code, async (name) => {
       if (await act('rename', {site: code, name})) { choose(name); }
-    })) : element('p', {className: 'hint', textContent: 'Click on the bone at this site.'}),
+    })) : element('p', {className: 'hint', textContent: 'Click on the bone at this site, or turn the bone below the middle of the view and press P.'}),
     landmark ? remarks(landmark) : null,
     allSites
   ].filter((part) => part);
@@ -158,7 +158,7 @@ export function landmarkPanel(bench) {
     head.replaceChildren(
         element('p', {textContent: `${placed.length} of ${standardSites().length} sites are placed${proposed ? `, ${proposed} of them proposed` : ''}.`}),
         element('div', {className: 'row'},
-            button(suggestion(state), () => act('propose'), {className: proposed ? '' : 'primary',
+            confirmed(state) === standardSites().length ? null : button(suggestion(state), () => act('propose'), {className: proposed ? '' : 'primary',
                    title: 'searches the other sites on the bone, from the points that you have placed'}),
             proposed ? button(`Review ${proposed}`, () => choose(toReview()[0].site),
                               {className: 'primary', title: 'the most doubtful first'}) : null,
@@ -174,27 +174,80 @@ export function landmarkPanel(bench) {
     marks();
   };
 
+  // Turns the view to the site, or to where the program expects it.
+  const lookAt = (code) => {
+    const known = landmarkOf(code) || store.state.predicted.find(({site}) => site === code);
+    if (known) { scene.turnTo(known.point); return; }
+    if (scene.shared.camera) { scene.shared.camera.look(code.endsWith('_l') ? 55 : code.endsWith('_r') ? -55 : 0, 5); }
+  };
+
   const pick = async (hitOf, ray, among) => {
     const skull = hitOf(['skull']), ball = among(scene.marks.children);
     if (ball && ball.object.userData.site && (!skull || ball.distance <= skull.distance + 4)) {
-      choose(ball.object.userData.site);
+      choose(ball.object.userData.site, {stay: true});
       return;
     }
     if (!skull || !store.site) { return; }
-    const site = store.site, isNew = !landmarkOf(site);
-    const wasProposed = !isNew && landmarkOf(site).proposed;
-    const done = await act('place', {site, origin: ray.origin.toArray(), direction: ray.direction.toArray(), near: skull.point.toArray()});
-    if (done && isNew) { choose(nextStep() || nextOpen(site)); }
-    if (done && wasProposed && toReview().length) { choose(toReview()[0].site); }
+    await place(store.site, placeOf(ray, skull.point));
   };
 
-  onChoice((code) => {
+  // The arguments of the action that places a site by a ray.
+  const placeOf = (ray, point) => ({origin: ray.origin.toArray(), direction: ray.direction.toArray(), near: point.toArray()});
+  const place = async (site, where, {stay = false} = {}) => {
+    const isNew = !landmarkOf(site), wasProposed = !isNew && landmarkOf(site).proposed;
+    const done = await act('place', {site, ...where});
+    if (done && isNew && !stay) { choose(nextStep() || nextOpen(site)); }
+    if (done && wasProposed && !stay && toReview().length) { choose(toReview()[0].site); }
+  };
+
+  // Handles a press on a ball for Scene.onDrag: a drag moves the landmark over the bone, a click chooses it.
+  const grip = (event) => {
+    const {stage} = scene.main, skull = stage.hit(event, ['skull']);
+    const ball = stage.ray.intersectObjects(scene.marks.children, true).find(({object}) => object.userData.site);
+    if (!ball || (skull && ball.distance > skull.distance + 4)) { return null; }
+    const {site} = ball.object.userData;
+    let where = null;
+    return {
+      move: (next, still) => {
+        const hit = still ? null : stage.hit(next, ['skull']);
+        if (!hit) { return; }
+        where = placeOf(stage.ray.ray, hit.point);
+        ball.object.position.copy(hit.point);
+        scene.draw();
+      },
+      end: async () => {
+        choose(site, {stay: true});
+        if (where) { await place(site, where, {stay: true}); }
+      },
+      cancel: marks
+    };
+  };
+
+  // Places the chosen site under a point of the view, by default its middle: without a pointer, the head is turned below it.
+  const placeAt = async (point, {stay = false} = {}) => {
+    const {stage, canvas} = scene.main, box = canvas.getBoundingClientRect();
+    const at = point ? point.clone().project(scene.shared.camera.camera) : {x: 0, y: 0};
+    const hit = stage.hit({clientX: box.left + (at.x + 1) / 2 * box.width, clientY: box.top + (1 - at.y) / 2 * box.height}, ['skull']);
+    if (hit && store.site) { await place(store.site, placeOf(stage.ray.ray, hit.point), {stay}); }
+  };
+  const nudge = async (key, mm) => {
+    const landmark = landmarkOf(store.site), [right, up] = [0, 1].map((column) =>
+        new THREE.Vector3().setFromMatrixColumn(scene.shared.camera.camera.matrixWorld, column));
+    const by = {w: up, s: up.clone().negate(), d: right, a: right.clone().negate()}[key];
+    await placeAt(new THREE.Vector3(...landmark.point).addScaledVector(by, mm), {stay: true});
+  };
+
+  onChoice((code, stay) => {
     if (!root.isConnected) { return; }
     draw();
+    if (code && !stay) { lookAt(code); }
     if (code) { about.scrollIntoView({block: 'nearest'}); }  // the list may have been scrolled far down
   });
   document.addEventListener('keydown', (event) => {
     if (!root.isConnected || ['INPUT', 'SELECT'].includes(event.target.tagName)) { return; }
+    const key = event.key.toLowerCase(), plain = !event.ctrlKey && !event.altKey && !event.metaKey;
+    if (plain && key === 'p' && store.site) { placeAt(null); }
+    if (plain && 'wasd'.includes(key) && store.site && landmarkOf(store.site)) { nudge(key, event.shiftKey ? 0.2 : 1); }
     if (event.key.toLowerCase() === 'n' && !event.ctrlKey) { choose(nextOpen(store.site || '')); }
     if (event.key === 'Delete' && store.site && landmarkOf(store.site)) { act('remove', {site: store.site}); }
     if (event.key === 'Enter' && event.target.tagName !== 'BUTTON' && store.site && landmarkOf(store.site)) { confirm(store.site); }
@@ -204,6 +257,7 @@ export function landmarkPanel(bench) {
     state: draw,
     show: () => {
       scene.onPick = pick;
+      scene.onDrag = grip;
       scene.shared.layers.get('face').shown = false;
       scene.shared.layers.get('dowels').shown = false;
       scene.update();
@@ -211,6 +265,7 @@ export function landmarkPanel(bench) {
     },
     hide: () => {
       scene.onPick = null;
+      scene.onDrag = null;
       scene.shared.layers.get('face').shown = true;
       scene.shared.layers.get('dowels').shown = true;
       scene.putMarks([]);

@@ -5,6 +5,7 @@ import {post, upload} from './api.js';
 import {documentation, kindOf} from './controls.js';
 import {button, element, field, select} from './dom.js';
 import {act, onState, showMessage, store} from './store.js';
+import {volumeLook} from './volume_look.js';
 
 const MAX_BYTES = 512 * 2 ** 20;  // the program's limit of a file from the browser
 const SKIPPED = /(^|\/)(\.[^/]*|Thumbs\.db|desktop\.ini)$/i;
@@ -95,7 +96,7 @@ export class Opener {
     }
     const {triangles} = store.state.subject, [usual] = this.imported.ways;
     const replaces = usual === 'landmarks' ? store.state.landmarks.length : triangles;
-    if (replaces) { this.draw(); } else { this.open(usual); }
+    if (replaces || this.imported.kind === 'volume') { this.draw(); } else { this.open(usual); }
   }
 
   async open(as) {
@@ -150,15 +151,33 @@ export class Opener {
         (kind === 'landmarks' ? landmarks.length : subject.triangles)
             ? element('p', {textContent: `${kind === 'landmarks' ? 'The file replaces' : 'Another head replaces'} ${replaced}. Undo restores it.`}) : '',
         this.axes ? field('axes', this.axes, 'used if the file states none') : '',
+        kind === 'volume' ? this.look() : '',
         kind === 'volume' ? this.volumeControls() : '',
         element('div', {className: 'ways'}, ...usable.map((way) => button(WAYS[kind][way], () => this.open(way), {dataset: {way}})),
                 button('Cancel', () => this.forget())));
-    this.root.querySelector('.ways button').focus();
+    this.root.querySelector('.ways button').focus({preventScroll: true});
+  }
+
+  // The slices stay while the options below them are drawn again.
+  look() {
+    const {import: usual} = this.ctOptions(), of = (name) => usual.properties[name].default;
+    if (this.looked !== this.imported) {
+      this.looked = this.imported;
+      this.lookElement = volumeLook(this.imported.path, this.volume, {bone_hu: of('bone_hu'), skin_hu: of('skin_hu')}, () => {
+        const controls = this.root.querySelector('details.reading');
+        if (controls) { controls.replaceWith(this.volumeControls()); }
+      });
+    }
+    return this.lookElement;
+  }
+
+  ctOptions() {
+    return kindOf(store.schema.properties.subject).objects.find((object) => object.properties.type.const === 'ct').properties;
   }
 
   // Options for reading a volume, with controls made from the program's schema.
   volumeControls() {
-    const ct = kindOf(store.schema.properties.subject).objects.find((object) => object.properties.type.const === 'ct').properties;
+    const ct = this.ctOptions();
     const row = (name, schema, target) => {
       const {doc, unit: stated} = documentation(schema), kind = kindOf(schema), unit = name.endsWith('_hu') ? 'HU' : stated;
       const set = (value) => { if (value === '') { delete target()[name]; } else { target()[name] = value; } };
@@ -170,7 +189,7 @@ export class Opener {
       return field(`${name.replaceAll('_', ' ').replace(/ (mm|hu|cm2)$/, '')}${unit ? ` (${unit})` : ''}`, made);
     };
     const inner = () => { this.volume.import = this.volume.import || {}; return this.volume.import; };
-    return element('details', {open: Object.keys(this.volume).length > 0}, element('summary', {textContent: 'Reading options'}),
+    return element('details', {className: 'reading'}, element('summary', {textContent: 'Reading options'}),
         ...['series', 'fill_slices'].map((name) => row(name, ct[name], () => this.volume)),
         ...Object.entries(ct.import.properties).map(([name, schema]) => row(name, schema, inner)));
   }

@@ -9,6 +9,7 @@ const LAYERS = {
   skin: {label: 'True skin', colour: '#b9c7d6'},
   dowels: {label: 'Depth markers', colour: '#b3261e'},
   face: {label: 'Face', colour: '#d8a58a'},
+  head: {label: 'Complete head', colour: '#d8a58a'},
 };
 const MAPS = {
   change: {title: 'change of the face, outwards +', low_mm: -8, high_mm: 8, no_data: '#8f8f8f',
@@ -49,7 +50,7 @@ export class Scene {
     this.drawSoon = () => this.draw();
     this.shared = {layers: new Map(), mapped: false, range_mm: 4, exaggeration: 1, camera: null, drawSoon: this.drawSoon};
     for (const id of Object.keys(LAYERS)) {
-      this.shared.layers.set(id, {shown: id !== 'skin', opacity: id === 'face' ? 0.75 : id === 'skin' ? 0.4 : 1});
+      this.shared.layers.set(id, {shown: id !== 'skin' && id !== 'head', opacity: id === 'face' ? 0.75 : id === 'skin' ? 0.4 : 1});
     }
     this.frames = element('div', {className: 'view3d-frames'});
     root.append(this.frames);  // before the first canvas, which takes its background from the page's style
@@ -206,13 +207,30 @@ export class Scene {
       const ball = new THREE.Mesh(
           new THREE.SphereBufferGeometry((mark.chosen ? 1.5 : 1) * size, 16, 12),
           new THREE.MeshPhongMaterial({color: mark.colour, transparent: mark.hollow, opacity: mark.hollow ? 0.45 : 1,
-                                       depthTest: !mark.chosen}));
+                                       depthWrite: !mark.hollow}));
       ball.position.set(...mark.point);
       ball.userData = {site: mark.site, text: mark.text};
-      ball.renderOrder = mark.chosen ? 900 : 0;
       this.marks.add(ball);
     }
     this.draw();
+  }
+
+  // Turns the camera to a point of the head, unless the point is in sight already.
+  turnTo(point) {
+    const {camera} = this.shared;
+    if (!camera || this.isInSight(new THREE.Vector3(...point))) { return; }
+    const [x, y, z] = new THREE.Vector3(...point).sub(camera.centre).toArray(), degrees = 180 / Math.PI;
+    camera.look(Math.atan2(x, -y) * degrees, Math.max(-35, Math.min(35, Math.atan2(z, Math.hypot(x, y)) * degrees)));
+  }
+
+  // True if the point of the bone is inside the picture, and no bone hides it.
+  isInSight(point) {
+    const {stage, canvas} = this.main, box = canvas.getBoundingClientRect(), eye = this.shared.camera.camera.position;
+    const at = point.clone().project(this.shared.camera.camera);
+    if (Math.max(Math.abs(at.x), Math.abs(at.y)) > 0.95) { return false; }
+    const hit = stage.hit({clientX: box.left + (at.x + 1) / 2 * box.width, clientY: box.top + (1 - at.y) / 2 * box.height}, ['skull']);
+    const towards = eye.clone().sub(point).angleTo(point.clone().sub(this.shared.camera.centre));
+    return (!hit || hit.distance > eye.distanceTo(point) - 3) && towards < 1.2;
   }
 
   // Shows an arrow from a to b, or removes it.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Editing the face by hand: a point of it is dragged, or held and pulled by buttons and keys, at the chosen level. Every
-// pull is an edit of control vertices in edits.yaml, which `semblance edit` and `semblance run` replay.
+// Editing the face by hand: a point of it is dragged, or held and pulled by buttons and keys, at the chosen level; brushes
+// smooth, inflate and flatten it. Every pull and every touch of a brush is an edit of control vertices in edits.yaml, which `semblance edit` and `semblance run` replay.
 import {button, check, element, field, group, select} from './dom.js';
 import {get, post} from './api.js';
 import {act, showMessage, store} from './store.js';
@@ -9,6 +9,8 @@ const MAX_DRAG_MM = 60;
 // A normal whose projection on the view is shorter than this points nearly at the viewer. A drag up or down then pulls
 // along it, because dividing by the short projection would make the pull much longer than the drag.
 const FACING = 0.35;
+const TOOLS = [['pull', 'Pull'], ['smooth', 'Smooth'], ['inflate', 'Inflate'], ['deflate', 'Deflate'], ['flatten', 'Flatten']];
+const TOUCH_EVERY_PX = 14;  // distance of a brush's touches along a stroke
 const KEYS = {o: 'out', i: 'in', a: 'left', d: 'right', w: 'up', s: 'down'};
 
 // Size of a pixel of the canvas in mm at a point.
@@ -104,6 +106,18 @@ export function sculptPanel({scene, faces}) {
   const drags = element('input', {type: 'checkbox', checked: true});
   const mode = select([['normal', 'along the normal'], ['view', 'in the plane of the view']], 'normal', () => {});
   mode.dataset.control = 'drag-mode';
+  let tool = 'pull';
+  const tools = element('div', {className: 'row'}, ...TOOLS.map(([name, text]) => button(text, () => setTool(name), {dataset: {tool: name}})));
+  const setTool = (name) => {
+    tool = name;
+    for (const made of tools.children) { made.setAttribute('aria-pressed', String(made.dataset.tool === tool)); }
+    brushRow.hidden = tool === 'pull';
+  };
+  const strength = element('input', {type: 'range', min: 0.1, max: 1, step: 0.1, value: 0.5});
+  const brushRow = element('div', {hidden: true}, field('strength', strength, 'a click touches the face once, a stroke several times; inflate and deflate: in mm'));
+  // The arguments of a touch of the brush at a point.
+  const touchOf = (point) => ({at: point.toArray(), ...options, kind: tool === 'deflate' ? 'inflate' : tool,
+                               strength: Number(strength.value) * (tool === 'deflate' ? -1 : 1)});
   const way = element('p', {className: 'soft', role: 'status'});
   const library = element('div');
 
@@ -143,10 +157,35 @@ export function sculptPanel({scene, faces}) {
     way.textContent = found ? 'The point in the middle of the view is held.' : 'No point of the face is in the middle of the view.';
   };
 
+  const touchMiddle = () => {
+    holdMiddle();
+    if (held && tool !== 'pull') { act('brush', touchOf(held.point)); }
+  };
+
+  // A stroke of a brush. A touch waits until the face of the one before has arrived.
+  const stroke = (event, first) => {
+    let at = event, busy = false;
+    const touch = async (point) => {
+      busy = true;
+      await act('brush', touchOf(point));
+      busy = false;
+    };
+    touch(first.point);
+    const move = (next) => {
+      if (busy || faces.busy || Math.hypot(next.clientX - at.clientX, next.clientY - at.clientY) < TOUCH_EVERY_PX) { return; }
+      const found = pointAt(next);
+      if (!found) { return; }
+      at = next;
+      touch(found.point);
+    };
+    return {move, end: () => {}, cancel: () => {}};
+  };
+
   // Handles a press on the face for Scene.onDrag; null for a press elsewhere.
   const grip = (event) => {
     const found = drags.checked && store.state.face.fresh && faces.kind === 'full' && pointAt(event);
     if (!found) { return null; }
+    if (tool !== 'pull') { return stroke(event, found); }
     const start = {x: event.clientX, y: event.clientY};
     let preview = null, by = null;
     const showLength = () => { way.textContent = `${by.length().toFixed(1)} mm`; };
@@ -197,16 +236,18 @@ export function sculptPanel({scene, faces}) {
             onchange: (event) => act('blend_feature', {name: feature, weight: Number(event.target.value)})})))));
   };
 
+  setTool('pull');
   const root = element('div', {}, words,
-      group('Pull',
+      group('Tool', tools, brushRow,
             field('level', element('span', {className: 'row'}, level, levelWords), 'a coarse level moves a large part of the face, a fine one a small part'),
             field('reach', reach), check('Both sides', mirror),
             check('A drag on the face pulls it', drags), field('a drag pulls', mode, 'if the normal points at you, up pulls out'), way),
       group('By buttons and keys',
+            button('Touch the middle with the brush', touchMiddle, {title: 'B', dataset: {pull: 'touch'}}),
             button('Hold the point in the middle', holdMiddle, {title: 'H', dataset: {pull: 'hold'}}),
             field('distance (mm)', distance), element('div', {className: 'row'}, ways.out, ways.in),
             element('div', {className: 'row'}, ways.left, ways.right, ways.up, ways.down),
-            element('small', {className: 'doc', textContent: 'H holds the point in the middle of the view, O and I pull it out and push it in, W A S D move it in the plane of the view; Escape releases it.'})),
+            element('small', {className: 'doc', textContent: 'B touches the middle of the view with the brush. H holds the point there, O and I pull it out and push it in, W A S D move it in the plane of the view; Escape releases it.'})),
       library, count, button('Remove all edits', () => act('clear_edits')));
 
   document.addEventListener('keydown', (event) => {
@@ -214,6 +255,7 @@ export function sculptPanel({scene, faces}) {
     if (!root.isConnected || types || event.ctrlKey || event.altKey || event.metaKey || !store.state.face.fresh) { return; }
     const key = event.key.toLowerCase();
     if (key === 'h') { holdMiddle(); }
+    if (key === 'b') { touchMiddle(); }
     if (KEYS[key]) { step(KEYS[key]); }
     if (event.key === 'Escape' && held) { hold(null); }
   });

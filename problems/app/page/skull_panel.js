@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Opens a head, and shows whether its size and pose are those of a head.
+// Opens a head, shows whether its size and pose are those of a head, and removes from it what is no bone.
 import {button, element, field, group, lines, select} from './dom.js';
 import {chooser} from './opener.js';
 import {act} from './store.js';
@@ -34,16 +34,53 @@ function asRead({subject, values}) {
       lines(subject.faults, 'bad'), lines(subject.notes, 'soft'));
 }
 
-export function skullPanel({scene, opener}) {
-  const facts = element('div');
+// Removal of bone that is none: a click on a piece, or on the middle of a ball. Calls done() at a change of the tool.
+function removal() {
+  let tool = null;
+  const radius = element('input', {type: 'range', min: 1, max: 20, step: 1, value: 5, oninput: () => { size.textContent = `${radius.value} mm`; }});
+  const size = element('output', {textContent: '5 mm'}), hint = element('p', {className: 'hint', hidden: true});
+  radius.setAttribute('aria-label', 'radius of the ball in mm');
+  const TEXTS = {piece: 'Click on a piece that is no bone: the whole piece goes. Undo restores it.',
+                 ball: 'Click on what is no bone: all within the ball goes. Undo restores it.'};
+  const choose = (name) => {
+    tool = tool === name ? null : name;
+    for (const made of buttons) { made.setAttribute('aria-pressed', String(made.dataset.remove === tool)); }
+    hint.hidden = !tool;
+    hint.textContent = tool ? TEXTS[tool] : '';
+  };
+  const buttons = [button('A whole piece', () => choose('piece'), {dataset: {remove: 'piece'}}),
+                   button('A ball around the click', () => choose('ball'), {dataset: {remove: 'ball'}})];
+  const made = element('details', {}, element('summary', {textContent: 'Remove tubes, metal, head holder'}),
+      element('div', {className: 'row'}, ...buttons), field('radius of the ball', radius, ''), size, hint);
+  const pick = (hitOf) => {
+    const hit = tool && hitOf(['skull']);
+    if (hit) { act('remove_bone', {near: hit.point.toArray(), within_mm: tool === 'ball' ? Number(radius.value) : null}); }
+  };
+  return {made, pick, stop: () => { if (tool) { choose(tool); } }};
+}
+
+export function skullPanel(bench) {
+  const {scene, opener} = bench;
+  const facts = element('div'), remover = removal();
   const look = (name, turn, rise) => button(name, () => scene.shared.camera && scene.shared.camera.look(turn, rise));
   const root = element('div', {},
       element('p', {textContent: 'Drop files anywhere on this page, choose them, or enter a path: a mesh of a skull; a CT (all slices together, their folder, or a file); landmarks; a configuration.'}),
-      chooser(opener, 'Open'), facts);
+      chooser(opener, 'Open'), facts, remover.made);
   const state = (now) => {
+    remover.made.hidden = !now.subject.triangles;
     facts.replaceChildren(...(now.subject.triangles
-        ? [asRead(now), element('div', {className: 'row'}, look('Front', 0, 0), look('Left', 90, 0), look('Top', 0, 89))]
+        ? [element('p', {className: 'hint', textContent: 'Is this the whole skull, upright, facing you in the view Front?'}),
+           element('div', {className: 'row'}, look('Front', 0, 0), look('Left', 90, 0), look('Top', 0, 89)),
+           element('div', {className: 'row'}, button('Yes: go on to the landmarks', () => bench.show('landmarks'), {className: 'primary', dataset: {go: 'landmarks'}})),
+           asRead(now)]
         : [element('p', {className: 'soft', textContent: 'No skull is open yet.'})]));
   };
-  return {element: root, state};
+  // This step shows bare bone, because a person judges its frame here.
+  const showFace = (shown) => {
+    for (const id of ['face', 'dowels']) { scene.shared.layers.get(id).shown = shown; }
+    scene.update();
+  };
+  return {element: root, state, 
+          show: () => { showFace(false); scene.onPick = remover.pick; },
+          hide: () => { showFace(true); scene.onPick = null; remover.stop(); }};
 }

@@ -15,8 +15,9 @@ export const showMessage = (words) => {
   box.hidden = !words;
 };
 
-export const setState = (state) => {
-  const former = store.state;
+// whole: show all anew, because another process numbers its changes from the beginning.
+export const setState = (state, {whole = false} = {}) => {
+  const former = whole ? null : store.state;
   store.state = state;
   for (const listener of listeners) { listener(state, former); }
 };
@@ -67,7 +68,8 @@ export const nameOf = (code) => {
 // The chosen site, which the next click on the bone places.
 const choosers = [];
 export const onChoice = (listener) => { choosers.push(listener); };
-export const choose = (code) => {
+// stay: the view does not turn to the site.
+export const choose = (code, {stay = false} = {}) => {
   store.site = code;
-  for (const listener of choosers) { listener(code); }
+  for (const listener of choosers) { listener(code, stay); }
 };

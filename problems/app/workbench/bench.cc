@@ -48,9 +48,12 @@ const FileSubject& SubjectFiles(const Experiment& experiment) {
   return *files;
 }
 
-// The experiment without the files that follow from the state: those of landmarks and edits.
+// The experiment without the files that follow from the state (landmarks and edits), and without
+// the texts that change no face.
 Experiment WithoutStateFiles(Experiment experiment, const BenchState& state) {
   experiment.edits.clear();
+  experiment.title.clear();
+  experiment.record = {};
   auto* const files = std::get_if<FileSubject>(&experiment.subject);
   if (files != nullptr && !state.landmarks.empty()) {
     files->landmarks.clear();
@@ -119,12 +122,18 @@ std::vector<ReferenceHead> ReadReferences(const BenchOptions& options) {
 }
 
 // Hash of all that a face depends on, without the edits.
-std::string RunKey(const Experiment& experiment, const BenchState& state,
-                   const InputHashes& contents) {
+std::string RunKey(const Experiment& experiment, BenchState state, const InputHashes& contents) {
+  state.subject.clear();
   return Sha256OfText(ContentText(experiment, "", contents) + LandmarksText(state));
 }
 
 std::string HashOfEdits(const BenchState& state) { return Sha256OfText(EditsText(state)); }
+
+// Hash of all else that a run's folder depends on: the edits and the texts of the report.
+std::string HashOfRest(const Experiment& experiment, const BenchState& state) {
+  return Sha256OfText(EditsText(state) + "\n" + state.subject + "\n" + experiment.title + "\n" +
+                      ToFlowYaml(MakeConfigTree(experiment.record)));
+}
 
 std::string FaultsText(const RunResult& result) {
   return FaultMarks(PlausibilityToJson(result.plausibility)).dump();
@@ -246,8 +255,8 @@ void Bench::LoadStoredRun() {
                  .notes = {},
                  .faults = ReadFileBytes(faults),
                  .key = {},
-                 .edits = {}};
-  keys >> stored.key >> stored.edits;
+                 .rest = {}};
+  keys >> stored.key >> stored.rest;
   if (stored.key == present_key_) {
     try {
       Case head = CoarseCase(*subject_, experiment_, CurrentState(history_));
@@ -304,7 +313,8 @@ Bench::Snapshot Bench::TakeSnapshot() {
     shot.has_face = true;
     shot.face_revision = face_revision_;
     shot.face_fresh = face_->key == present_key_;
-    shot.run_saved = shot.face_fresh && face_->edits == HashOfEdits(CurrentState(history_));
+    shot.run_saved =
+        shot.face_fresh && face_->rest == HashOfRest(experiment_, CurrentState(history_));
   }
   const std::string key = variants_.empty() ? "" : VariantsKey();
   for (const auto& [variant, made] : variants_) {
@@ -369,6 +379,29 @@ void Bench::CorrectFrame(const std::string& path, const std::string& value) {
   Commit(AddStep(history_, "set " + path, std::move(state)));
 }
 
+void Bench::RemoveBone(const Vec3& near, std::optional<double> within_mm) {
+  const Lock lock(mutex_);
+  CheckSkull();
+  if (!near.allFinite()) {
+    throw InputError("removal: the point is not finite");
+  }
+  const MeshPoint at = subject_->bone->Closest(near);
+  TriMesh rest = within_mm ? WithoutBall(subject_->skull.mesh, at.position, *within_mm)
+                           : WithoutPiece(subject_->skull.mesh, at.triangle);
+  ReplaceSkull(rest, {folder_, CurrentState(history_), experiment_}, [this](Opened opened) {
+    Commit(AddStep(history_, opened.what, std::move(opened.state)));
+  });
+}
+
+std::shared_ptr<const VolumeReading> Bench::ReadUnopened(const fs::path& path,
+                                                         const ReadVolumeOptions& options) {
+  return volume_.Read(path, options, Context());
+}
+
+std::vector<VolumeSeries> Bench::SeriesOf(const fs::path& path) const {
+  return ListSeries(path, Context());
+}
+
 HSplineSurface Bench::Edited(const RunFace& face) const {
   HSplineSurface surface = face.before_edits;
   ApplyEdits(CurrentState(history_).edits, surface);
@@ -382,6 +415,15 @@ void Bench::PullAt(const Vec3& at, Pull pull) {
   Commit(AddStep(
       history_, fmt::format("pulled level {} by {:.1f} mm", pull.level, pull.by_mm.norm()),
       ReplaceEdits(CurrentState(history_), Pulled(pull, surface, CurrentState(history_).edits))));
+}
+
+void Bench::BrushAt(const Vec3& at, Brush brush) {
+  const Lock lock(mutex_);
+  const HSplineSurface surface = Edited(FreshFace());
+  brush.uv = NearestParameter(surface, at);
+  Commit(AddStep(
+      history_, fmt::format("brushed level {} ({})", brush.level, EnumWord(brush.kind)),
+      ReplaceEdits(CurrentState(history_), Brushed(brush, surface, CurrentState(history_).edits))));
 }
 
 std::array<std::vector<Vec3>, 3> Bench::PullMovesAt(const Vec3& at, Pull pull) const {
@@ -614,10 +656,10 @@ RunFace Bench::MakeRun(const Experiment& experiment, const RunContext& context, 
                result.subject.notes,
                FaultsText(result),
                present_key_,
-               HashOfEdits(CurrentState(history_))};
+               HashOfRest(experiment_, CurrentState(history_))};
   WriteHSpline(folder_.Root() / kBeforeEdits, face.before_edits);
   WriteFileAtomically(folder_.Root() / kRunFaults, face.faults);
-  WriteFileAtomically(folder_.Root() / kRunKey, face.key + "\n" + face.edits + "\n");
+  WriteFileAtomically(folder_.Root() / kRunKey, face.key + "\n" + face.rest + "\n");
   face_ = face;
   face_revision_ = ++revision_;
   return face;

@@ -18,7 +18,7 @@
 //   3. Full face of the last run (face_), as TakeSnapshot reports it:
 //
 //                    run ends, or
-//                    a stored run is found    edits change
+//                    a stored run is found    edits or texts change
 //        NO FACE ----------------> SAVED <--------------------> UNSAVED
 //                                   |  ^                           |  ^
 //               landmarks, options, |  |  the same changed back,   |  |
@@ -28,8 +28,9 @@
 //                                     any change of state; the end of a run leads to SAVED
 //
 //        SAVED:   has_face, face_fresh, run_saved. run/ holds this face with the present edits.
-//        UNSAVED: has_face, face_fresh. run/ holds this face with other edits. Pulls and features
-//                 work in SAVED and UNSAVED only.
+//        UNSAVED: has_face, face_fresh. run/ holds this face with other edits, or a report with
+//                 other texts (name, title, record). Pulls and features work in SAVED and UNSAVED
+//                 only.
 //        STALE:   has_face. The face belongs to other landmarks, options, contents of files or
 //                 another subject. It is kept, because undo may make it fresh again. Full() still
 //                 returns it.
@@ -65,7 +66,7 @@
 //       and only if face_->key == present_key_; a variant, if and only if its key is VariantsKey().
 //       Faces are never deleted when they become stale. The key of a run is that of the files
 //       before the run read them, so a file that changes meanwhile makes the face stale.
-//   (5) run_key.txt, with the keys of the face and of the edits, is written after run/ and
+//   (5) run_key.txt, with the keys of the face and of the rest, is written after run/ and
 //       kBeforeEdits. A later workbench compares both with its own current step.
 //   (6) revision_ grows with every Commit, every kept feature and every finished run.
 //       subject_revision_ grows with every new subject_. face_revision_ is the revision at which
@@ -98,6 +99,7 @@
 #include "problems/app/workbench/bench_job.h"
 #include "problems/app/workbench/bench_open.h"
 #include "problems/app/workbench/bench_subject.h"
+#include "problems/app/workbench/bench_volume.h"
 #include "problems/experiment/input_contents.h"
 #include "problems/face/pull.h"
 #include "problems/subject/propose/reference_head.h"
@@ -118,7 +120,7 @@ struct RunFace {
   std::vector<std::string> notes;
   std::string faults;  // BenchFace::faults
   std::string key;     // hash of the configuration with its files and landmarks, without edits
-  std::string edits;   // hash of the edit script that run/ was made with
+  std::string rest;    // hash of the edits and texts that run/ was made with
 };
 
 // Safe to use from several threads. A method that throws leaves the state unchanged.
@@ -162,6 +164,8 @@ class Bench {
 
   // Pulls the full face at its point nearest to `at`. Throws InputError if the face is not fresh.
   void PullAt(const Vec3& at, Pull pull);
+  // Brushes the full face at its point nearest to `at`. Throws InputError if the face is not fresh.
+  void BrushAt(const Vec3& at, Brush brush);
   // The displacements of the shown vertices for such a pull, as PullMoves returns them.
   std::array<std::vector<Vec3>, 3> PullMovesAt(const Vec3& at, Pull pull) const;
 
@@ -185,6 +189,18 @@ class Bench {
   // Sets axes or unit of the subject's files (arguments of ChangeSetting). Landmarks on the bone
   // move with it. Other landmarks stay, because their file may have the right frame already.
   void CorrectFrame(const std::string& path, const std::string& value);
+
+  // Removes bone from the skull, for example a tube or a part of a head holder: the whole piece
+  // that is connected with the point of the bone nearest to `near` or, with within_mm, all bone in
+  // a ball around that point. The landmarks stay, and the former mesh stays in the folder. Throws
+  // InputError without a skull, if the mandible has a file of its own, and if the piece is more
+  // than half of the skull.
+  void RemoveBone(const Vec3& near, std::optional<double> within_mm);
+
+  // Reads a volume that is not opened yet, for a look at its slices.
+  std::shared_ptr<const VolumeReading> ReadUnopened(const std::filesystem::path& path,
+                                                    const ReadVolumeOptions& options);
+  std::vector<VolumeSeries> SeriesOf(const std::filesystem::path& path) const;
 
   // Start background jobs. Each replaces a running job.
   void StartOpening(const OpenRequest& request);
@@ -244,6 +260,7 @@ class Bench {
   std::shared_ptr<StageCache> models_;  // templates and priors
   mutable StageCache coarse_{8};        // coarse faces: the last ones tried, and the six variants
   std::shared_ptr<StageCache> run_stages_;  // of one subject and one set of landmarks
+  BenchVolume volume_;                      // has its own lock
   BenchJob job_;                            // last: destroyed and stopped first
 };
 

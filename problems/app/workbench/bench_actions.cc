@@ -68,6 +68,14 @@ bool IsProposed(const Landmark& landmark, const LandmarkFile& file) {
 
 }  // namespace
 
+BenchState NameCase(BenchState state, const std::string& name) {
+  if (name.empty() || name.size() > kMaxName_bytes) {
+    throw InputError(fmt::format("name: a case has a name of 1 to {} bytes", kMaxName_bytes));
+  }
+  state.subject = name;
+  return state;
+}
+
 BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& point) {
   CheckSite(site);
   if (!point.allFinite()) {

@@ -14,6 +14,10 @@
 
 namespace semblance::problems {
 
+// Names the case. The name has 1 to kMaxName_bytes bytes.
+inline constexpr std::size_t kMaxName_bytes = 400;
+BenchState NameCase(BenchState state, const std::string& name);
+
 // Places the site or moves it. The site is then neither proposed nor absent. Its measurements and
 // a person's note stay. Its normal is dropped because the normal belonged to the former place.
 BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& point);

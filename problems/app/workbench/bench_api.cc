@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <iterator>
 #include <new>
@@ -20,11 +21,13 @@
 #include "problems/experiment/experiment_config.h"
 #include "problems/report/pictures/site_picture.h"
 #include "problems/report/report_assets.h"
+#include "problems/report/view/view_mesh.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/hspline_files/face_export.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance::problems {
 namespace {
@@ -153,6 +156,16 @@ BenchReply SitePictureReply(Bench&, const BenchRequest& request) {
 
 BenchReply Schema(Bench&, const BenchRequest&) { return JsonReply(OptionsSchema<Experiment>()); }
 
+// pooled: the table has one build and one sex.
+Json TableJson(const fs::path& path) {
+  const TissueTable table = ReadTissueTable(path);
+  return {{"path", path.string()},
+          {"title", table.title},
+          {"population", table.population_label},
+          {"citation", table.citation},
+          {"pooled", table.rows.front().values.contains("adult")}};
+}
+
 // The files of the folder that options may name, the parts of the template and the kept features.
 BenchReply Files(Bench& bench, const BenchRequest&) {
   Json json = {{"tables", Json::array()}, {"networks", Json::array()}};
@@ -165,8 +178,8 @@ BenchReply Files(Bench& bench, const BenchRequest&) {
     std::ranges::sort(names);
     for (const std::string& name : names) {
       const fs::path path = bench.Folder() / name;
-      json[kind].push_back({{"path", path.string()},
-                            {"title", kind == "tables" ? ReadTissueTable(path).title : name}});
+      json[kind].push_back(kind == "tables" ? TableJson(path)
+                                            : Json{{"path", path.string()}, {"title", name}});
     }
   }
   json["parts"] = bench.PartsOfFace();
@@ -214,6 +227,34 @@ BenchReply FaceFile(Bench& bench, const BenchRequest& request) {
   return {200, "application/octet-stream",
           EncodeFace(face.surface, extension, /*chord_mm=*/std::nullopt, /*threads=*/1),
           name + extension};
+}
+
+// The complete head of the last run in mm, LPS. Throws InputError if run/ holds none of the present
+// state.
+TriMesh CompleteHead(Bench& bench) {
+  const fs::path file = bench.Folder() / "run" / "bust.obj";
+  if (!bench.TakeSnapshot().run_saved) {
+    throw InputError("the head belongs to another state; make the face first");
+  }
+  if (!fs::exists(file)) {
+    throw InputError("this template has no head; set the option `bust`, and make the face again");
+  }
+  return ReadMesh(file);
+}
+
+BenchReply HeadReply(Bench& bench, const BenchRequest&) {
+  return JsonReply(Json{{"mesh", EncodeMeshBlob(SimplifyForView(CompleteHead(bench)))}}.dump());
+}
+
+// Exports the complete head: the run's own file for .glb, which has colours, or its mesh.
+BenchReply HeadFile(Bench& bench, const BenchRequest& request) {
+  const std::string format = QueryText(request, "format");
+  const TriMesh head = CompleteHead(bench);
+  if (format == ".glb") {
+    return {200, "application/octet-stream", ReadFileBytes(bench.Folder() / "run" / "bust.glb"),
+            "head.glb"};
+  }
+  return {200, "application/octet-stream", EncodeMesh(head, format), "head" + format};
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -302,6 +343,15 @@ void Set(Bench& bench, const Json& json) {
     return ChangeSetting(std::move(s), path, json.at("value").dump());
   });
 }
+void Name(Bench& bench, const Json& json) {
+  const std::string name = ReadText(json, "name");
+  bench.Apply("named the case", [&](BenchState s) { return NameCase(std::move(s), name); });
+}
+void RemoveBone(Bench& bench, const Json& json) {
+  const Json& within = json.at("within_mm");
+  bench.RemoveBone(ReadVector(json, "near"),
+                   within.is_null() ? std::nullopt : std::optional(within.get<double>()));
+}
 void Unset(Bench& bench, const Json& json) {
   const std::string path = ReadText(json, "path");
   bench.Apply("reset " + path, [&](BenchState s) { return DropSetting(std::move(s), path); });
@@ -315,6 +365,13 @@ void PullFace(Bench& bench, const Json& json) {
   Pull pull = ReadPull(json);
   pull.by_mm = ReadVector(json, "by");
   bench.PullAt(ReadVector(json, "at"), pull);
+}
+void BrushFace(Bench& bench, const Json& json) {
+  bench.BrushAt(ReadVector(json, "at"), {.kind = ReadEnum<BrushKind>(json, "kind"),
+                                         .level = json_parts::IntFromJson(json.at("level")),
+                                         .strength = json.at("strength").get<double>(),
+                                         .reach = json.at("reach").get<double>(),
+                                         .mirror = json.at("mirror").get<bool>()});
 }
 void ClearEdits(Bench& bench, const Json&) {
   bench.Apply("removed all edits", [](BenchState s) { return ReplaceEdits(std::move(s), {}); });
@@ -356,7 +413,7 @@ void RunFace(Bench& bench, const Json&) { bench.StartRun(); }
 void ProposeSites(Bench& bench, const Json&) { bench.StartProposal(); }
 void Cancel(Bench& bench, const Json&) { bench.CancelJob(); }
 
-constexpr std::array<std::pair<std::string_view, Action>, 22> kActions = {
+constexpr std::array<std::pair<std::string_view, Action>, 25> kActions = {
     {{"place", &Place},
      {"remove", &Remove},
      {"rename", &Rename},
@@ -367,9 +424,12 @@ constexpr std::array<std::pair<std::string_view, Action>, 22> kActions = {
      {"clear_landmarks", &ClearLandmarks},
      {"set", &Set},
      {"unset", &Unset},
+     {"name", &Name},
+     {"remove_bone", &RemoveBone},
      {"open", &OpenFile},
      {"forget", &Forget},
      {"pull", &PullFace},
+     {"brush", &BrushFace},
      {"clear_edits", &ClearEdits},
      {"keep_feature", &Keep},
      {"blend_feature", &Blend},
@@ -416,6 +476,61 @@ BenchReply PullPreview(Bench& bench, const BenchRequest& request) {
 
 BenchReply State(Bench& bench, const BenchRequest&) { return StateReply(bench); }
 
+// ---------------------------------------------------------------------------------------------
+// A volume before it is opened: ?path=FILE_OR_FOLDER&series=NAME
+// ---------------------------------------------------------------------------------------------
+
+BenchReply SeriesReply(Bench& bench, const BenchRequest& request) {
+  Json json = Json::array();
+  for (const VolumeSeries& series : bench.SeriesOf(QueryText(request, "path"))) {
+    json.push_back({{"name", series.name},
+                    {"description", series.description},
+                    {"modality", series.modality},
+                    {"slices", series.slices},
+                    {"columns", series.columns},
+                    {"rows", series.rows}});
+  }
+  return JsonReply(json.dump());
+}
+
+std::shared_ptr<const VolumeReading> RequestedVolume(Bench& bench, const BenchRequest& request) {
+  return bench.ReadUnopened(QueryText(request, "path"),
+                            {.series = QueryText(request, "series"),
+                             .fill_slices = QueryText(request, "fill") == "true"});
+}
+
+BenchReply VolumeReply(Bench& bench, const BenchRequest& request) {
+  const auto reading = RequestedVolume(bench, request);
+  return JsonReply(Json{
+      {"is_mr", reading->modality == Modality::kMr},
+      {"counts", {reading->volume.columns, reading->volume.rows, reading->volume.slices}},
+      {"notes",
+       reading->notes}}.dump(-1, ' ', false, Json::error_handler_t::replace));
+}
+
+// A number of the query; `usual` if it is missing. Throws BadRequest for other texts.
+double QueryNumber(const BenchRequest& request, const char* key, double usual) {
+  const std::string text = QueryText(request, key);
+  double number = usual;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  if (!text.empty() && (error != std::errc() || end != text.data() + text.size())) {
+    throw BadRequest(fmt::format("{}: this is no number", key));
+  }
+  return number;
+}
+
+BenchReply SliceReply(Bench& bench, const BenchRequest& request) {
+  SliceOptions options{.at = QueryNumber(request, "at", 0.5),
+                       .bone_hu = QueryNumber(request, "bone_hu", kNaN),
+                       .skin_hu = QueryNumber(request, "skin_hu", kNaN),
+                       .longest_side = QueryNumber(request, "side", 320)};
+  options.plane = ReadEnum<SlicePlane>(Json{{"plane", QueryText(request, "plane")}}, "plane");
+  return {200,
+          "image/png",
+          EncodePng(DrawSlice(RequestedVolume(bench, request)->volume, options), PngEffort::kQuick),
+          {}};
+}
+
 using Handler = BenchReply (*)(Bench&, const BenchRequest&);
 struct Route {
   std::string_view method, path;
@@ -435,6 +550,11 @@ constexpr std::array kRoutes = {
     Route{"GET", "api/variant", &VariantReply},
     Route{"GET", "api/landmarks", &LandmarksFile},
     Route{"GET", "api/export", &FaceFile},
+    Route{"GET", "api/head", &HeadReply},
+    Route{"GET", "api/series", &SeriesReply},
+    Route{"GET", "api/volume", &VolumeReply},
+    Route{"GET", "api/slice.png", &SliceReply},
+    Route{"GET", "api/export_head", &HeadFile},
     Route{"POST", "api/act", &Act},
     Route{"POST", "api/look", &Identify},
     Route{"POST", "api/pull", &PullPreview},

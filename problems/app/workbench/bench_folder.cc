@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/app/workbench/bench_folder.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <sstream>
 #include <string_view>
 #include <system_error>
 
@@ -27,6 +31,7 @@ namespace fs = std::filesystem;
 constexpr const char* kHistory = "workbench.yaml";
 constexpr const char* kStart = "start.yaml";
 constexpr const char* kClaim = ".semblance-workbench";
+constexpr const char* kAddress = ".address";
 
 fs::path MakeFolder(const fs::path& root) {
   std::error_code error;
@@ -155,6 +160,38 @@ Experiment BenchFolder::ReadExperiment(const BenchState& state) const {
 
 Experiment BenchFolder::ReadSavedExperiment() const {
   return ReadConfig<Experiment>(root_ / "config.yaml");
+}
+
+void WriteSecret(const fs::path& file, std::string_view text) {
+  ::unlink(file.c_str());
+  const int descriptor = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+  const bool written = descriptor >= 0 && ::write(descriptor, text.data(), text.size()) ==
+                                              static_cast<ssize_t>(text.size());
+  ::close(descriptor);
+  if (!written) {
+    throw IoError(fmt::format("{}: cannot be written; check the folder's rights and the disk",
+                              file.string()));
+  }
+}
+
+BenchAddress ReadAddress(const fs::path& root) {
+  const fs::path file = root / kAddress;
+  struct ::stat about {};
+  const bool is_ours = ::lstat(file.c_str(), &about) == 0 && S_ISREG(about.st_mode) &&
+                       about.st_uid == ::geteuid() && (about.st_mode & 077) == 0;
+  if (!is_ours) {
+    return {};
+  }
+  BenchAddress address;
+  std::istringstream text(ReadFileBytes(file));
+  text >> address.port >> address.token;
+  const bool is_token = address.token.size() == 64 &&
+                        address.token.find_first_not_of("0123456789abcdef") == std::string::npos;
+  return text && is_token && address.port > 0 && address.port < 65536 ? address : BenchAddress();
+}
+
+void StoreAddress(const fs::path& root, const BenchAddress& address) {
+  WriteSecret(root / kAddress, fmt::format("{} {}\n", address.port, address.token));
 }
 
 fs::path IncomingBatch(const fs::path& root, const std::string& batch) {

@@ -9,6 +9,8 @@
 //   run/             the last full run
 //   variants/        full faces of other builds and depths
 //   incoming/        uploads of the browser, one folder per batch, until they are opened
+//   .address         the last port and token, so that a restarted server has the address of a page
+//                    that is still open; only this user can read it
 #pragma once
 
 #include <filesystem>
@@ -65,6 +67,21 @@ std::filesystem::path FreePath(const std::filesystem::path& wanted);
 // The texts of landmarks.yaml and edits.yaml; empty if the state has no landmarks or edits.
 std::string LandmarksText(const BenchState& state);
 std::string EditsText(const BenchState& state);
+
+// The address at which the folder's page was served last.
+struct BenchAddress {
+  int port = 0;       // 0: none
+  std::string token;  // empty: none
+};
+
+// Reads the stored address; none if there is none, or if anyone else can read or write the file.
+BenchAddress ReadAddress(const std::filesystem::path& root);
+
+// Stores the address in a file that only this user can read. Throws IoError.
+void StoreAddress(const std::filesystem::path& root, const BenchAddress& address);
+
+// Writes a file that only this user can read, in place of an earlier one. Throws IoError.
+void WriteSecret(const std::filesystem::path& file, std::string_view text);
 
 // ---------------------------------------------------------------------------------------------
 // Uploads of the browser in FOLDER/incoming

@@ -130,6 +130,7 @@ std::string SnapshotJson(const Bench::Snapshot& shot, const std::filesystem::pat
                {"job", JobJson(shot.job)},
                {"face",
                 {{"there", shot.has_face},
+                 {"head", std::filesystem::exists(folder / "run" / "bust.obj")},
                  {"fresh", shot.face_fresh},
                  {"saved", shot.run_saved},
                  {"revision", shot.face_revision}}},

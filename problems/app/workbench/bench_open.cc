@@ -388,6 +388,7 @@ Opened OpenConfig(const OpenRequest& request, const fs::path& path, const OpenBa
 
 Opened OpenLandmarks(const OpenRequest& request, const fs::path& path, const OpenBase& base) {
   LandmarkReading reading = ReadLandmarks(path, {.axes = request.axes});
+  reading.file.subject.clear();  // landmarks do not rename the case
   return {.what = {},
           .state = ReplaceLandmarks(base.state, reading.file),
           .notes = std::move(reading.notes)};
@@ -468,6 +469,28 @@ void OpenImportedFile(const OpenRequest& request, const OpenBase& base, const Ru
   if (!batch.empty()) {
     DropIncoming(base.folder.Root(), batch.filename().string());
   }
+}
+
+void ReplaceSkull(const TriMesh& skull, const OpenBase& base,
+                  const std::function<void(Opened)>& commit) {
+  const FileSubject& files = SubjectFiles(base);
+  if (!files.mandible.mesh.empty()) {
+    throw InputError(
+        "removal: skull and mandible are separate files here; remove the piece in another program");
+  }
+  constexpr std::string_view kCleaned = "_cleaned";
+  std::string stem = files.skull.stem().string();
+  if (const std::size_t at = stem.find(kCleaned); at != std::string::npos) {
+    stem.resize(at);
+  }
+  Additions added(base.folder);
+  const fs::path file = added.NewPath(fmt::format("{}{}.ply", stem, kCleaned));
+  WriteFileAtomically(file, EncodeMesh(ToSubjectFrame(files, skull), ".ply"));
+  commit(
+      {.what = "removed bone",
+       .state = ChangeSetting(base.state, "subject.skull", PathForState(file, base.folder.Root())),
+       .notes = {}});
+  added.Keep();
 }
 
 }  // namespace semblance::problems

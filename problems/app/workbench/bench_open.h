@@ -13,6 +13,7 @@
 #include "problems/app/workbench/bench_folder.h"
 #include "problems/experiment/experiment.h"
 #include "surfaces/base/run_context.h"
+#include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance::problems {
 
@@ -72,5 +73,11 @@ struct Opened {
 // ReadLandmarks and `commit`; InputError if the kind of file cannot have the requested role.
 void OpenImportedFile(const OpenRequest& request, const OpenBase& base, const RunContext& context,
                       const std::function<void(Opened)>& commit);
+
+// Passes the state with `skull` (mm, LPS) as the skull of the same head to `commit`. The mesh
+// becomes a new file in the folder, which is removed again if `commit` throws. Throws InputError if
+// the mandible has a file of its own.
+void ReplaceSkull(const TriMesh& skull, const OpenBase& base,
+                  const std::function<void(Opened)>& commit);
 
 }  // namespace semblance::problems

@@ -108,7 +108,7 @@ bool IsAnyOf(const std::string& extension, std::initializer_list<const char*> ex
 // The experiment of a workbench that begins without a configuration.
 Experiment DefaultExperiment(const fs::path& folder) {
   Experiment experiment;
-  experiment.title = "Workbench";
+  experiment.title = "Facial approximation";  // the page asks for the person of such a case
   experiment.tissue.table = folder / "tables/rhine_caucasoid.yaml";
   experiment.network = folder / "networks/standard32.yaml";
   return experiment;
@@ -141,6 +141,37 @@ FileSubject WithStatedAxes(FileSubject files) {
     files.axes = *stated.begin();
   }
   return files;
+}
+
+TriMesh WithoutPiece(const TriMesh& mesh, int triangle) {
+  const Components pieces = ConnectedComponents(mesh);
+  const int piece = pieces.of_triangle.at(static_cast<std::size_t>(triangle));
+  double area = 0;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    area += pieces.of_triangle[t] == piece ? TriangleAreaVector(mesh, mesh.triangles[t]).norm() : 0;
+  }
+  if (area > Area(mesh) / 2) {
+    throw InputError(
+        "removal: this piece is the skull itself, because what should go is connected with it; "
+        "remove the bone around the point instead");
+  }
+  std::vector<bool> keep(mesh.triangles.size());
+  std::ranges::transform(pieces.of_triangle, keep.begin(), [&](int of) { return of != piece; });
+  return Submesh(mesh, keep);
+}
+
+TriMesh WithoutBall(const TriMesh& mesh, const Vec3& centre, double radius_mm) {
+  constexpr double kLeast_mm = 0.5, kMost_mm = 30;
+  if (!(radius_mm >= kLeast_mm && radius_mm <= kMost_mm)) {
+    throw InputError(fmt::format("removal: a radius of {} mm; give {} to {} mm", radius_mm,
+                                 kLeast_mm, kMost_mm));
+  }
+  std::vector<bool> keep(mesh.triangles.size());
+  std::ranges::transform(mesh.triangles, keep.begin(), [&](const Triangle& t) {
+    return std::ranges::none_of(
+        t, [&](int v) { return (mesh.points[v] - centre).norm() < radius_mm; });
+  });
+  return Submesh(mesh, keep);
 }
 
 BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context) {

@@ -36,6 +36,14 @@ struct BenchSubject {
 // read.
 FileSubject WithStatedAxes(FileSubject files);
 
+// The mesh without the piece (component) of the triangle. Throws InputError if the piece has more
+// than half of the mesh's area, because it is the skull itself then.
+TriMesh WithoutPiece(const TriMesh& mesh, int triangle);
+
+// The mesh without the triangles that have a corner within the radius, 0.5 to 30 mm. Throws
+// InputError for another radius.
+TriMesh WithoutBall(const TriMesh& mesh, const Vec3& centre, double radius_mm);
+
 // Throws IoError or InputError if a file cannot be read at all.
 BenchSubject LoadBenchSubject(const FileSubject& files, const RunContext& context);
 

@@ -267,6 +267,51 @@ TEST_F(WorkbenchOpening, AConfigurationIsUploadedWithTheFilesThatItNames) {
   EXPECT_TRUE(bench.TakeSnapshot().subject->bone);
 }
 
+TEST_F(WorkbenchOpening, LandmarksDoNotRenameTheCase) {
+  Bench bench(Options(skull_));
+  ASSERT_EQ(Open(bench, landmarks_, OpenAs::kLandmarks).state, JobState::kFinished);
+  EXPECT_THAT(StateIn(bench.TakeSnapshot()).landmarks, SizeIs(2));
+  EXPECT_EQ(StateIn(bench.TakeSnapshot()).subject, "skull");
+}
+
+TEST_F(WorkbenchOpening, APieceThatIsNoBoneIsRemovedAndTheSkullIsNot) {
+  TriMesh mesh = phantom_.skull;
+  const std::size_t bone = mesh.triangles.size();
+  const int first = static_cast<int>(mesh.points.size());
+  const Vec3 tube(0, Bounds(mesh).min().y() - 30, 0);
+  for (const Vec3& corner : {Vec3(0, 0, 0), Vec3(4, 0, 0), Vec3(0, 4, 0), Vec3(0, 0, 4)}) {
+    mesh.points.push_back(tube + corner);
+  }
+  for (const Triangle& t : {Triangle{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}) {
+    mesh.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+  }
+  Bench bench(Options(Write("tube.ply", EncodeMesh(mesh, ".ply"))));
+  const auto triangles = [&] { return bench.TakeSnapshot().subject->skull.mesh.triangles.size(); };
+  ASSERT_EQ(triangles(), bone + 4);
+  bench.RemoveBone(tube, std::nullopt);
+  EXPECT_EQ(triangles(), bone);
+  EXPECT_THAT(WordsOf<InputError>([&] { bench.RemoveBone(tube, std::nullopt); }),
+              HasSubstr("the skull itself"));
+  EXPECT_THROW(bench.RemoveBone(tube, 31), InputError);
+  bench.RemoveBone(tube, 8);
+  EXPECT_LT(triangles(), bone);
+  bench.Undo();
+  bench.Undo();
+  EXPECT_EQ(triangles(), bone + 4);
+}
+
+TEST_F(WorkbenchOpening, AnAddressThatOthersCanReadIsNotUsed) {
+  const std::string token(64, 'a');
+  EXPECT_EQ(ReadAddress(folder_.Path()).port, 0);
+  StoreAddress(folder_.Path(), {4711, token});
+  EXPECT_EQ(ReadAddress(folder_.Path()).port, 4711);
+  EXPECT_EQ(ReadAddress(folder_.Path()).token, token);
+  fs::permissions(folder_ / ".address", fs::perms::others_read, fs::perm_options::add);
+  EXPECT_EQ(ReadAddress(folder_.Path()).token, "");
+  StoreAddress(folder_.Path(), {4711, "short"});
+  EXPECT_EQ(ReadAddress(folder_.Path()).port, 0);
+}
+
 TEST_F(WorkbenchOpening, NoNameLeadsOutOfTheFolder) {
   const std::string longest(200, 'a');
   EXPECT_NO_THROW(SaveIncoming(folder_.Path(), "b", longest, ""));

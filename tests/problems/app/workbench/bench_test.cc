@@ -188,6 +188,21 @@ void Touch(const fs::path& file) { WriteFileAtomically(file, ReadFileBytes(file)
 
 // For each kind of input: changed while the workbench runs, changed back, and changed between two
 // workbenches.
+TEST_F(WorkbenchBench, NotesMakeTheReportStaleButNotTheFace) {
+  Bench bench(Options());
+  RunUntilEnd(bench);
+  bench.Apply("note", [](BenchState s) { return ChangeSetting(s, "record.notes", "\"found\""); });
+  EXPECT_TRUE(bench.TakeSnapshot().face_fresh);
+  EXPECT_FALSE(bench.TakeSnapshot().run_saved);
+  bench.Undo();
+  EXPECT_TRUE(bench.TakeSnapshot().run_saved);
+  bench.Apply("name", [](BenchState s) { return NameCase(std::move(s), "Case <17>"); });
+  EXPECT_TRUE(bench.TakeSnapshot().face_fresh);
+  EXPECT_FALSE(bench.TakeSnapshot().run_saved);
+  RunUntilEnd(bench);
+  EXPECT_THAT(ReadFileBytes(bench.Folder() / "run" / "report.html"), HasSubstr("Case &lt;17&gt;"));
+}
+
 TEST_F(WorkbenchBench, AFileThatChangesOnTheDiskMakesTheFaceStale) {
   const fs::path root = folder_ / "bench", skull = root / "subject/skull.ply",
                  table = root / "tables/rhine_caucasoid.yaml";

@@ -29,6 +29,36 @@ def choose_role(browser, role):
     browser.click(f'#opening [data-way="{role}"]')
 
 
+def go_to(browser, panel):
+    """Compare is a part of the step that begins with Sculpt."""
+    browser.click(f"[data-tab={'sculpt' if panel == 'compare' else panel}]")
+    if panel == "compare":
+        browser.click("[data-part=compare]")
+
+
+def name_case(browser, name):
+    browser.click("[data-tab=person]")
+    browser.run("const field = document.querySelector('[data-record=name]'); field.value = arguments[0];"
+                "field.dispatchEvent(new Event('change'))", name)
+    await_subject(browser, name)
+
+
+def expect_questions(browser):
+    """A case without a configuration has no sex, build and table until the person states them."""
+    open_fields = "return [...document.querySelectorAll('#panel .field.open')].map((field) => field.dataset.ask)"
+    browser.click("[data-tab=person]")
+    assert browser.run(open_fields) == ["tissue.table", "tissue.sex", "tissue.build"]
+    browser.run("window.semblance.makeFace()")
+    assert "state the person" in browser.run(MESSAGE)
+    for path, value in (("tissue.table", "rhine_caucasoid"), ("tissue.sex", "female"), ("tissue.build", "normal")):
+        browser.run("const choice = document.querySelector(`[data-ask='${arguments[0]}'] select`);"
+                    "choice.value = [...choice.options].find((option) => option.value.includes(arguments[1])).value;"
+                    "choice.dispatchEvent(new Event('change'))", path, value)
+        browser.wait("return window.semblance.store.state.settings.some((setting) => setting.path === arguments[0])", path)
+    assert browser.run(open_fields) == []
+    assert state(browser)["values"]["tissue"]["sex"] == "female"
+
+
 def await_subject(browser, name):
     browser.wait("return window.semblance.store.state.subject.name === arguments[0]", name)
     browser.wait(IDLE)
@@ -73,6 +103,20 @@ def open_from_nothing(browser, config):
     await_subject(browser, "phantom 1")
 
 
+def expect_slices(browser):
+    """The volume is shown in three planes before it is opened; the threshold tints other voxels as bone."""
+    note = "return document.querySelector('.volume-look [role=status]').textContent"
+    browser.wait(note + " !== 'Reading the volume \u2026'")
+    if "ITK" in browser.run(note):
+        return
+    loaded = "return [...document.querySelectorAll('.slices img')].filter((i) => i.complete && i.naturalWidth > 100).length === 3"
+    browser.wait(loaded)
+    browser.run("const bone = document.querySelector('[data-control=bone_hu]'); bone.value = 500;"
+                "bone.dispatchEvent(new Event('input')); bone.dispatchEvent(new Event('change'))")
+    browser.wait("return [...document.querySelectorAll('.slices img')].every((i) => i.complete && i.src.includes('bone_hu=500'))")
+    assert browser.run("return window.semblance.opener.volume.import.bone_hu") == 500
+
+
 def open_slices(browser, folder, pictures):
     """Chooses several files together. The page asks before it replaces the head; the new head has its skin."""
     folder.mkdir()
@@ -80,6 +124,7 @@ def open_slices(browser, folder, pictures):
     browser.click("[data-tab=skull]")
     browser.choose_files("#panel .chooser input[type=file]", *slices)
     browser.wait("return document.querySelector('#opening [data-way]')", seconds=100)
+    expect_slices(browser)
     take_picture(browser, pictures, "ask")
     assert state(browser)["subject"]["name"] == "phantom 1", "replaced without a question"
     choose_role(browser, "head")
@@ -119,8 +164,10 @@ def hostile_names(browser, pictures):
     scripts = browser.run("return document.scripts.length")
     text = f"subject: {quoted(HOSTILE)}\nlandmarks:\n  - {{site: g, point: [0, -80, 0], note: {quoted(HOSTILE)}}}\n"
     drop(browser, {f"{HOSTILE.replace('/', '_')}.yaml": text})
-    await_subject(browser, HOSTILE)
+    browser.wait("return window.semblance.store.state.landmarks.length === 1")
     assert landmark(browser, "g")["note"] == HOSTILE
+    assert state(browser)["subject"]["name"] == "block", "landmarks do not rename the case"
+    name_case(browser, HOSTILE)
     browser.click("[data-tab=landmarks]")
     browser.click('[data-site="g"]')
     refused(browser, lambda: drop(browser, {f"{HOSTILE.replace('/', '_')}.docx": "x"}), "<script>")
@@ -135,11 +182,12 @@ def hostile_names(browser, pictures):
     browser.wait("return window.semblance.store.state.values.title.startsWith('<script>')")
     drop(browser, {"long.yaml": f"subject: {LONG}\nlandmarks:\n  - {{site: g, point: [0, -80, 0]}}\n"})
     choose_role(browser, "landmarks")
-    await_subject(browser, LONG)
+    browser.wait(IDLE)
+    name_case(browser, LONG)
     for width, height in ((1000, 640), (400, 800)):
         browser.resize(width, height)
-        for tab in ("skull", "landmarks", "face", "sculpt", "compare", "measure"):
-            browser.click(f"[data-tab={tab}]")
+        for tab in ("skull", "landmarks", "person", "face", "sculpt", "compare", "report", "measure"):
+            go_to(browser, tab)
             browser.settle()
             wide = browser.run("return document.documentElement.scrollWidth")
             assert wide <= width, f"{tab}: {wide} pixels wide"
@@ -168,7 +216,7 @@ def compare_variants(browser, config, pictures):
     give_path(browser, config)
     choose_role(browser, "head")
     await_subject(browser, "phantom 1")
-    browser.click("[data-tab=compare]")
+    go_to(browser, "compare")
     browser.click("[data-set=deviations]")
     frames = "document.querySelectorAll('#view .view3d-frame:not([hidden]) canvas').length"
     browser.wait(f"return {frames} === 3")
@@ -198,6 +246,7 @@ def work(browser, program, config, folder, pictures):
     try:
         browser.open(bench.url)
         browser.wait("return window.semblance && window.semblance.store.state")
+        expect_questions(browser)
         open_from_nothing(browser, config)
         open_slices(browser, folder.parent / "slices", pictures)
         correct_unit(browser, mesh_in_metres(folder.parent / "block.obj"))

@@ -128,6 +128,57 @@ def place_by_clicks(browser, points):
         assert placed["from_bone_mm"] < 1e-3, placed
 
 
+def drag_a_landmark(browser, site):
+    """Drags the ball of a site over the bone."""
+    browser.click("[data-tab=landmarks]")
+    browser.run("window.semblance.scene.shared.camera.look(0, 5)")
+    before = landmark(browser, site)["point"]
+    x, y = browser.run(PLACE, *before)
+    browser.press_and_drag((x, y), (x + 14, y + 6))
+    browser.release()
+    browser.wait("const l = window.semblance.store.state.landmarks.find((l) => l.site === arguments[0]);"
+                 "return l.point[0] !== arguments[1]", site, before[0])
+    moved = landmark(browser, site)
+    assert 2 < distance(moved["point"], before) < 25 and moved["from_bone_mm"] < 1e-3, (moved, before)
+    browser.press(UNDO)
+    browser.wait("const l = window.semblance.store.state.landmarks.find((l) => l.site === arguments[0]);"
+                 "return l.point[0] === arguments[1]", site, before[0])
+
+
+def place_by_keys(browser, site):
+    """P places the chosen site in the middle of the view; W A S D move it."""
+    browser.run("window.semblance.scene.shared.camera.look(20, 0); document.activeElement.blur()")
+    before = landmark(browser, site)["point"]
+    browser.press("p")
+    browser.wait("const l = window.semblance.store.state.landmarks.find((l) => l.site === arguments[0]);"
+                 "return l.point[0] !== arguments[1]", site, before[0])
+    middle = landmark(browser, site)["point"]
+    browser.press("w")
+    browser.wait("const l = window.semblance.store.state.landmarks.find((l) => l.site === arguments[0]);"
+                 "return l.point[2] !== arguments[1]", site, middle[2])
+    assert 0.5 < landmark(browser, site)["point"][2] - middle[2] < 1.5
+    browser.press(UNDO)
+    browser.press(UNDO)
+    browser.wait("const l = window.semblance.store.state.landmarks.find((l) => l.site === arguments[0]);"
+                 "return l.point[0] === arguments[1]", site, before[0])
+
+
+def brush_the_face(browser):
+    """A touch of a brush changes control vertices, and makes the report out of date."""
+    browser.click("[data-tab=sculpt]")
+    browser.run("window.semblance.scene.shared.camera.look(35, 0)")
+    before = state(browser)["edited_vertices"]
+    browser.click("[data-tool=inflate]")
+    browser.click("[data-pull=touch]")
+    browser.wait("return window.semblance.store.state.edited_vertices !== arguments[0]", before)
+    assert "inflate" in undo_words(browser)
+    assert "out of date" in browser.run("return document.querySelector('#job a').textContent")
+    browser.press(UNDO)
+    browser.wait("return window.semblance.store.state.edited_vertices === arguments[0]", before)
+    assert browser.run("return document.querySelector('#job a').textContent") == "Report"
+    browser.click("[data-tool=pull]")
+
+
 def expect_site_picture(browser, site):
     """Expects the picture of the site beside its definition, both inside the window."""
     browser.run("document.querySelector(arguments[0]).click()", f'[data-site="{site}"]')
@@ -289,6 +340,8 @@ def work(browser, program, config, folder, pictures):
         expect_site_picture(browser, "zy_l")
         picture("landmarks")
         place_by_clicks(browser, points)
+        drag_a_landmark(browser, "n")
+        place_by_keys(browser, "n")
         browser.press(UNDO)
         browser.wait("return !window.semblance.store.state.landmarks.some((l) => l.site === 'go_r')")
         browser.click("#redo")
@@ -301,6 +354,7 @@ def work(browser, program, config, folder, pictures):
         picture("face")
         make_full_face(browser)
         picture("full")
+        brush_the_face(browser)
         pull_the_cheek(browser)
         pull_by_keys(browser)
         picture("sculpt")
@@ -308,8 +362,12 @@ def work(browser, program, config, folder, pictures):
         vertices = state(browser)["edited_vertices"]
 
         # The program crashes, and another one continues.
+        former = bench.url
         bench.kill()
+        browser.wait("return !document.getElementById('lost').hidden")
         bench = Workbench(program, [folder])
+        assert bench.url == former, "an open page finds the program again"
+        browser.wait("return document.getElementById('lost').hidden")
         browser.complaints()  # the page requested from an ended program
         browser.darken()
         browser.open(bench.url)
@@ -340,7 +398,7 @@ def work(browser, program, config, folder, pictures):
 
         browser.resize(400, 800)
         browser.run("window.scrollTo(0, 0)")
-        for tab in ("landmarks", "face", "sculpt", "measure", "skull"):
+        for tab in ("landmarks", "person", "face", "sculpt", "report", "measure", "skull"):
             browser.click(f"[data-tab={tab}]")
             browser.settle()
             wide = browser.run("return document.documentElement.scrollWidth")
