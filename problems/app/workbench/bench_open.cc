@@ -82,7 +82,7 @@ ImportKind YamlKind(const fs::path& path) {
   if (tree.Find("rows") != nullptr) {
     throw InputError(
         fmt::format("{}: this is a depth table; open a head first, then give the table's path as "
-                    "tissue.table (tab Face, All options)",
+                    "tissue.table (step Face, All options)",
                     path.string()));
   }
   if (tree.Find("base") == nullptr && OwnKeys<Experiment>(path) == 0) {
