@@ -156,7 +156,8 @@ TriMesh WithoutPiece(const TriMesh& mesh, int triangle) {
         "remove the bone around the point instead");
   }
   std::vector<bool> keep(mesh.triangles.size());
-  std::ranges::transform(pieces.of_triangle, keep.begin(), [&](int of) { return of != piece; });
+  std::transform(pieces.of_triangle.begin(), pieces.of_triangle.end(), keep.begin(),
+                 [&](int of) { return of != piece; });
   return Submesh(mesh, keep);
 }
 
@@ -167,10 +168,11 @@ TriMesh WithoutBall(const TriMesh& mesh, const Vec3& centre, double radius_mm) {
                                  kLeast_mm, kMost_mm));
   }
   std::vector<bool> keep(mesh.triangles.size());
-  std::ranges::transform(mesh.triangles, keep.begin(), [&](const Triangle& t) {
-    return std::ranges::none_of(
-        t, [&](int v) { return (mesh.points[v] - centre).norm() < radius_mm; });
-  });
+  std::transform(mesh.triangles.begin(), mesh.triangles.end(), keep.begin(),
+                 [&](const Triangle& t) {
+                   return std::ranges::none_of(
+                       t, [&](int v) { return (mesh.points[v] - centre).norm() < radius_mm; });
+                 });
   return Submesh(mesh, keep);
 }
 
