@@ -64,8 +64,9 @@ export function skullPanel(bench) {
   const facts = element('div'), remover = removal();
   const look = (name, turn, rise) => button(name, () => scene.shared.camera && scene.shared.camera.look(turn, rise));
   const root = element('div', {},
+      facts, remover.made,
       element('p', {textContent: 'Drop files anywhere on this page, choose them, or enter a path: a mesh of a skull; a CT (all slices together, their folder, or a file); landmarks; a configuration.'}),
-      chooser(opener, 'Open'), facts, remover.made);
+      chooser(opener, 'Open'));
   const state = (now) => {
     remover.made.hidden = !now.subject.triangles;
     facts.replaceChildren(...(now.subject.triangles

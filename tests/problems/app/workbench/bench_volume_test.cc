@@ -12,7 +12,9 @@ namespace {
 
 // Air with bone in one voxel: the one at the right, at the front, in the lowest slice.
 CtVolume OneBone() {
-  CtVolume volume{.columns = 4, .rows = 4, .slices = 4, .spacing_mm = {1, 1, 2}};
+  CtVolume volume;
+  volume.columns = volume.rows = volume.slices = 4;
+  volume.spacing_mm = {1, 1, 2};
   volume.values.assign(64, -1000);
   volume.values[volume.Index(0, 0, 0)] = 1000;
   return volume;
