@@ -36,7 +36,7 @@ def look_at_slices(browser):
 
 def open_head(browser):
     browser.click('#opening [data-way="head"]')
-    browser.wait("return window.semblance.store.state.subject.triangles > 0", seconds=600)
+    browser.wait("return window.semblance.store.state.subject.triangles > 0 && window.semblance.scene.shared.camera", seconds=600)
     browser.wait(IDLE, seconds=300)
     browser.run("window.semblance.scene.shared.camera.look(0, 0)")
 

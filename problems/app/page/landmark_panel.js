@@ -196,7 +196,11 @@ export function landmarkPanel(bench) {
   const place = async (site, where, {stay = false} = {}) => {
     const isNew = !landmarkOf(site), wasProposed = !isNew && landmarkOf(site).proposed;
     const done = await act('place', {site, ...where});
-    if (done && isNew && !stay) { choose(nextStep() || nextOpen(site)); }
+    if (done && isNew && !stay) {
+      const begun = FIRST_CLICKS.includes(site) && confirmed(store.state) === FIRST_CLICKS.length;  // the program can suggest the rest
+      choose(nextStep() || (begun ? null : nextOpen(site)));
+      if (begun) { head.scrollIntoView({block: 'nearest'}); }
+    }
     if (done && wasProposed && !stay && toReview().length) { choose(toReview()[0].site); }
   };
 

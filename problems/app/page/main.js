@@ -21,7 +21,8 @@ import {act, begin, choose, onState, showMessage, store} from './store.js';
 const STEPS = [
   {title: 'Skull', panels: {skull: ['Skull', skullPanel]}, done: ({subject}) => subject.triangles > 0 && !subject.faults.length},
   {title: 'Landmarks', panels: {landmarks: ['Landmarks', landmarkPanel]},
-   done: ({landmarks, errors}) => landmarks.length > 2 && !errors.length && landmarks.every(({proposed}) => !proposed)},
+   done: (state) => !state.errors.length && state.landmarks.every(({proposed}) => !proposed) && store.sites.every(({site, standard}) =>
+       !standard || [...state.landmarks, ...state.absent].some((one) => one.site === site))},
   {title: 'Person', panels: {person: ['Person', personPanel]}, done: isStated},
   {title: 'Face', panels: {face: ['Face', facePanel]}, done: ({face}) => face.fresh},
   {title: 'Compare, sculpt', panels: {sculpt: ['Sculpt', sculptPanel], compare: ['Compare', comparePanel]}, done: () => false},
@@ -55,6 +56,7 @@ function makeSteps(bench) {
     byId('panel').replaceChildren(panel.element);
     byId('panel').scrollTop = 0;
     showMessage('');
+    bench.opener.dismiss();
     if (panel.show) { panel.show(); }
     if (panel.state && store.state) { panel.state(store.state, null); }
     steps.find((one) => one.step === step).made.scrollIntoView({block: 'nearest', inline: 'nearest'});

@@ -132,6 +132,9 @@ export class Opener {
     if (batch) { await act('forget', {batch}); }
   }
 
+  // Hides the remarks on a file that is open already.
+  dismiss() { if (!this.waits && !this.imported) { this.show(''); } }
+
   show(text) {
     this.root.hidden = !text;
     this.root.replaceChildren(text ? element('p', {textContent: text}) : '',
