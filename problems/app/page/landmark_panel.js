@@ -258,7 +258,8 @@ export function landmarkPanel(bench) {
   });
   return {
     element: root,
-    state: draw,
+    // Not at each report of a job, because drawing takes the processor that the job needs.
+    state: (state, former) => { if (!former || former.revision !== state.revision) { draw(); } },
     show: () => {
       scene.onPick = pick;
       scene.onDrag = grip;
