@@ -62,6 +62,12 @@ function personGroup(state) {
       measured ? null : controlAt('tissue.fill_from', 'missing depths from'));
 }
 
+// A selector of the field that has the keyboard, so that a new panel can give it back; null for none.
+const focusedField = (root) => {
+  const now = document.activeElement, row = now && root.contains(now) && now.closest('[data-ask]');
+  return row ? `[data-ask="${row.dataset.ask}"] select` : now && now.dataset.record ? `[data-record="${now.dataset.record}"]` : null;
+};
+
 export function personPanel(bench) {
   const root = element('div');
   let drawn = '';
@@ -70,11 +76,12 @@ export function personPanel(bench) {
     const key = JSON.stringify([now.values.record, now.values.tissue, now.values.title, now.subject.name, now.settings]);
     if (key === drawn) { return; }
     drawn = key;
-    const open = missing(now).length;
+    const open = missing(now).length, focused = focusedField(root);
     root.replaceChildren(
         element('p', {textContent: open ? 'Please state what is known of the person. The program assumes nothing.' : 'The person is stated.'}),
         personGroup(now), caseGroup(now),
         element('div', {className: 'row'}, button('Go on: the face', () => bench.show('face'), {className: 'primary', disabled: open > 0})));
+    if (focused) { root.querySelector(focused)?.focus(); }
   };
   return {element: root, state};
 }

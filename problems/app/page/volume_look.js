@@ -5,6 +5,7 @@ import {get} from './api.js';
 import {button, element, field} from './dom.js';
 
 const PLANES = [['axial', 'axial, from below'], ['coronal', 'coronal, from the front'], ['sagittal', 'sagittal']];
+const MOST_PREVIEWS = 12;
 const addressOf = (query) => `api/slice.png?${new URLSearchParams(query)}`;
 
 // A picture whose next address waits until the present one has arrived.
@@ -39,6 +40,18 @@ function slices(source, thresholds) {
     return {draw, made: element('figure', {dataset: {plane}}, made, place, element('figcaption', {textContent: title}))};
   });
   return {draw: () => views.forEach(({draw}) => draw()), made: element('div', {className: 'slices'}, ...views.map(({made}) => made))};
+}
+
+// Loads the previews of series one after the other, because the program reads a whole series for each.
+async function loadPreviews(list) {
+  for (const image of [...list.querySelectorAll('img.preview')].slice(0, MOST_PREVIEWS)) {
+    if (!list.isConnected) { return; }
+    await new Promise((next) => {
+      image.addEventListener('load', next);
+      image.addEventListener('error', () => { image.remove(); next(); });
+      image.src = image.dataset.address;
+    });
+  }
 }
 
 // path: of the volume. options: the options for reading it, which this element changes: {series, import: {bone_hu}}.
@@ -83,12 +96,11 @@ export function volumeLook(path, options, usual, changed) {
         note.textContent = 'Choose the series of the head.';
         list.replaceChildren(...all.map(({name, description, modality, slices: count, columns, rows}) => {
           const made = button('', () => choose(name), {dataset: {series: name}});
-          const preview = element('img', {alt: '', className: 'preview', loading: 'lazy', src: addressOf({path, series: name, plane: 'sagittal', at: 0.5, side: 80})});
-          preview.addEventListener('error', () => preview.remove());
-          made.append(preview, element('span', {textContent: `${description || 'no description'} (${name})`}), element('small', {textContent: `${modality}, ${count} slices of ${columns} \u00d7 ${rows}`}));
+          made.append(element('img', {alt: '', className: 'preview', dataset: {address: addressOf({path, series: name, plane: 'sagittal', at: 0.5, side: 80})}}), element('span', {textContent: `${description || 'no description'} (${name})`}), element('small', {textContent: `${modality}, ${count} slices of ${columns} \u00d7 ${rows}`}));
           return made;
         }));
         if (options.series) { await choose(options.series); }
+        loadPreviews(list);
         return;
       }
     } catch { /* the volume itself states the fault */ }

@@ -722,6 +722,7 @@ std::string Bench::Open(const OpenRequest& request, const RunContext& context) {
     experiment = experiment_;
     revision = revision_;
   }
+  volume_.Drop();  // the opening reads it with options of its own
   std::string words;
   OpenImportedFile(request, {folder_, state, experiment}, context, [&](Opened opened) {
     const Lock lock(mutex_);

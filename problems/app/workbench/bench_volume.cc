@@ -81,6 +81,12 @@ std::shared_ptr<const VolumeReading> BenchVolume::Read(const std::filesystem::pa
   return reading_;
 }
 
+void BenchVolume::Drop() {
+  const std::lock_guard lock(mutex_);
+  key_.clear();
+  reading_ = nullptr;
+}
+
 Image DrawSlice(const CtVolume& volume, const SliceOptions& options) {
   constexpr Colour kBone{1, 0.62, 0.2}, kSkin{0.3, 0.75, 1};
   constexpr double kTint = 0.55;

@@ -20,6 +20,8 @@ class BenchVolume {
   std::shared_ptr<const VolumeReading> Read(const std::filesystem::path& path,
                                             const ReadVolumeOptions& options,
                                             const RunContext& context);
+  // Frees the volume.
+  void Drop();
 
  private:
   std::mutex mutex_;
