@@ -17,7 +17,7 @@ constexpr double kLeastReach = 1, kMostReach = 8;
 
 // Throws InputError for a place that the face lacks. what: "pull" or "brush".
 template <class Edit>
-void CheckPlace(const Edit& edit, const HSplineSurface& face, const char* what) {
+void CheckEditPlace(const Edit& edit, const HSplineSurface& face, const char* what) {
   if (edit.level < 0 || edit.level > face.shape().max_level) {
     throw InputError(fmt::format("{}: the face has no level {}; its levels are 0 to {}", what,
                                  edit.level, face.shape().max_level));
@@ -29,14 +29,14 @@ void CheckPlace(const Edit& edit, const HSplineSurface& face, const char* what) 
 }
 
 void Check(const Pull& pull, const HSplineSurface& face) {
-  CheckPlace(pull, face, "pull");
+  CheckEditPlace(pull, face, "pull");
   if (!pull.uv.allFinite() || !pull.by_mm.allFinite() || pull.by_mm.norm() > 1000) {
     throw InputError("pull: (u,v) and the way must be finite, and the way at most 1000 mm long");
   }
 }
 
 void Check(const Brush& brush, const HSplineSurface& face) {
-  CheckPlace(brush, face, "brush");
+  CheckEditPlace(brush, face, "brush");
   constexpr double kMostInflation_mm = 20;
   const bool inflates = brush.kind == BrushKind::kInflate;
   const double low = inflates ? -kMostInflation_mm : 0, high = inflates ? kMostInflation_mm : 1;

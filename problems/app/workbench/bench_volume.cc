@@ -19,7 +19,7 @@ struct PlaneAxes {
 constexpr std::array kPlanes = {PlaneAxes{2, 0, 1, false}, PlaneAxes{0, 1, 2, true},
                                 PlaneAxes{1, 0, 2, true}};
 
-int Count(const CtVolume& volume, int axis) {
+int VoxelsAlong(const CtVolume& volume, int axis) {
   return std::array{volume.columns, volume.rows, volume.slices}[axis];
 }
 
@@ -32,14 +32,14 @@ class SliceReader {
  public:
   SliceReader(const CtVolume& volume, const SliceOptions& options)
       : volume_(volume), axes_(kPlanes[static_cast<std::size_t>(options.plane)]) {
-    at_[axes_.across] = VoxelOf(options.at, Count(volume, axes_.across));
+    at_[axes_.across] = VoxelOf(options.at, VoxelsAlong(volume, axes_.across));
   }
 
   const PlaneAxes& Axes() const { return axes_; }
 
   int Value(double right, double down) {
-    at_[axes_.right] = VoxelOf(right, Count(volume_, axes_.right));
-    at_[axes_.down] = VoxelOf(axes_.reversed ? 1 - down : down, Count(volume_, axes_.down));
+    at_[axes_.right] = VoxelOf(right, VoxelsAlong(volume_, axes_.right));
+    at_[axes_.down] = VoxelOf(axes_.reversed ? 1 - down : down, VoxelsAlong(volume_, axes_.down));
     return volume_.values[volume_.Index(at_[0], at_[1], at_[2])];
   }
 
@@ -92,7 +92,9 @@ Image DrawSlice(const CtVolume& volume, const SliceOptions& options) {
   constexpr double kTint = 0.55;
   CheckSliceOptions(options);
   SliceReader reader(volume, options);
-  const auto length_mm = [&](int axis) { return Count(volume, axis) * volume.spacing_mm[axis]; };
+  const auto length_mm = [&](int axis) {
+    return VoxelsAlong(volume, axis) * volume.spacing_mm[axis];
+  };
   const double wide_mm = length_mm(reader.Axes().right), high_mm = length_mm(reader.Axes().down);
   const double scale = options.longest_side / std::max(wide_mm, high_mm);
   Image image = MakeImage(std::max(1, static_cast<int>(wide_mm * scale)),
