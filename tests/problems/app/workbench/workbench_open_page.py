@@ -115,6 +115,7 @@ def expect_slices(browser):
                 "bone.dispatchEvent(new Event('input')); bone.dispatchEvent(new Event('change'))")
     browser.wait("return [...document.querySelectorAll('.slices img')].every((i) => i.complete && i.src.includes('bone_hu=500'))")
     assert browser.run("return window.semblance.opener.volume.import.bone_hu") == 500
+    browser.run("const bone = document.querySelector('[data-control=bone_hu]'); bone.value = 230; bone.dispatchEvent(new Event('input'))")
 
 
 def open_slices(browser, folder, pictures):

@@ -174,7 +174,7 @@ def brush_the_face(browser):
     assert "inflate" in undo_words(browser)
     assert "out of date" in browser.run("return document.querySelector('#job a').textContent")
     browser.press(UNDO)
-    browser.wait("return window.semblance.store.state.edited_vertices === arguments[0]", before)
+    browser.wait("return window.semblance.store.state.edited_vertices === arguments[0] && !window.semblance.faces.busy", before)
     assert browser.run("return document.querySelector('#job a').textContent") == "Report"
     browser.click("[data-tool=pull]")
 
