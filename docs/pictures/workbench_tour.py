@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The pictures of docs/tutorial/tour.md: workbench_tour.py PROGRAM FOLDER
+"""Pictures of the steps of docs/tutorial/tour.md: workbench_tour.py PROGRAM FOLDER
 
 Drives the page by clicks from a CT to a report, and takes a picture of each step: tour-1-slices.png and so on. The head is the CT
 of the Debian package invesalius-examples. Needs that package, chromium and chromedriver."""
