@@ -268,7 +268,9 @@ class Fitter {
     LevelView view = View(step.level, driver_.target());
     const bool frozen = std::holds_alternative<FrozenFeatures>(options_.features);
     const std::vector<int> stay = frozen ? view.held : std::vector<int>();
-    LevelSolution solution = FitLevel(std::move(view), terms, options_.solver, report);
+    LevelSolution solution = PlanAim(options_.plan) == FitAim::kLevel
+                                 ? FitLevelHeld(view, terms, options_.solver, report)
+                                 : FitLevel(std::move(view), terms, options_.solver, report);
     LevelSummary summary = std::move(solution.summary);
     summary.level = step.level;
     summary.fraction = step.fraction;

@@ -44,7 +44,8 @@ struct LevelSummary {
   int moved_vertices = -1;    // vertices that the step moved; -1: not counted (adaptive fits)
   double max_move_mm = kNaN;  // largest move of a vertex; Fit: after the step's fraction
   double auto_weight = kNaN;  // weight that was chosen for `weight: auto`, if a term has it
-  // Weight of the hold that kept weakly determined vertices from running away (FitLevel); 0: none.
+  // Weight of the hold that kept weakly determined vertices from running away (FitLevelHeld); 0:
+  // none.
   double hold = 0;
   std::string solver = "not run";  // ceres or direct
   std::string termination = "not run";

@@ -675,16 +675,16 @@ HSplineSurface SpaceSolve::SurfaceAfter(const Eigen::MatrixX3d& step) const {
   return moved.Surface();
 }
 
-namespace {
-
-LevelSolution SolveLevel(LevelView view, std::span<const Term> terms, Solver solver,
-                         SolveReport report) {
+LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver,
+                       SolveReport report) {
   LevelSolution solution{.net = view.start, .summary = {}};
   LevelSolve solve(std::move(view), terms, solver);
   solution.summary = solve.FinalSolve(report);
   solution.net.vertices = solve.Values().vertices;
   return solution;
 }
+
+namespace {
 
 // Returns true if no term restricts the vertices beyond the points.
 bool OnlyPoints(std::span<const Term> terms) {
@@ -706,7 +706,7 @@ double LargestMisfit_mm(const LevelView& view) {
 LevelSolution SolveHeld(const LevelView& view, std::vector<Term> terms, double weight,
                         Solver solver, SolveReport report) {
   terms.emplace_back(PriorTerm{.weight = weight, .towards = PriorTowards::kStart});
-  LevelSolution solution = SolveLevel(view, terms, solver, report);
+  LevelSolution solution = FitLevel(view, terms, solver, report);
   if (!solution.summary.terms.empty()) {
     solution.summary.terms.pop_back();  // of the hold
   }
@@ -721,14 +721,14 @@ LevelSolution SolveHeld(const LevelView& view, std::vector<Term> terms, double w
 // moves vertices by metres to remove a misfit of millimetres. The smallest hold is taken, in steps
 // of ten, that keeps the vertices within kReach misfits. A reach of 9 is what the shortest wave
 // that a net can follow needs: a third of a vertex's move arrives at the surface in each direction.
-LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver,
-                       SolveReport report) {
+LevelSolution FitLevelHeld(const LevelView& view, std::span<const Term> terms, Solver solver,
+                           SolveReport report) {
   constexpr double kReach = 10, kLeastHold = 1e-7, kMostHold = 1;  // of the terms' weight
   if (!OnlyPoints(terms) || view.observations.empty()) {
-    return SolveLevel(std::move(view), terms, solver, report);
+    return FitLevel(view, terms, solver, report);
   }
   const double reach_mm = kReach * LargestMisfit_mm(view);
-  LevelSolution solution = SolveLevel(view, terms, solver, report);
+  LevelSolution solution = FitLevel(view, terms, solver, report);
   double weight = 0;
   for (const Term& term : terms) {
     weight += TermWeight(term);

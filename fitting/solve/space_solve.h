@@ -230,13 +230,16 @@ struct LevelSolution {
 // Minimises the sum of the terms over the control vertices of one level, seen as a plain B-spline.
 // If the terms leave vertices undetermined, the solution nearest to view.start is taken: the steps
 // are damped by a multiple of the identity, a proximal-point iteration that converges to it
-// (thesis 4.2 does not treat this case). If the terms are of points alone, no vertex moves further
-// than ten times the largest misfit: a vertex that the points hardly determine stays near its start
-// instead of running away (LevelSummary::hold). The order of the observations has no effect.
-// Without a report the summary has no term costs, coverage or rank. Throws InputError like
-// LevelSolve.
+// (thesis 4.2 does not treat this case). The order of the observations has no effect. Without a
+// report the summary has no term costs, coverage or rank. Throws InputError like LevelSolve.
 LevelSolution FitLevel(LevelView view, std::span<const Term> terms, Solver solver = Solver::kCeres,
                        SolveReport report = SolveReport::kFull);
+
+// The same, but if the terms are of points alone, no vertex moves further than ten times the
+// largest misfit: a vertex that the points hardly determine stays near its start instead of running
+// away (LevelSummary::hold). Fit uses it for FitAim::kLevel, the way of the thesis.
+LevelSolution FitLevelHeld(const LevelView& view, std::span<const Term> terms,
+                           Solver solver = Solver::kCeres, SolveReport report = SolveReport::kFull);
 
 // Summarises the numbers of observations per patch.
 PatchCoverage MakeCoverage(const std::vector<int>& counts);

@@ -184,7 +184,7 @@ int FinestLevel(const FitResult& fit) {
   return finest;
 }
 
-// The terms of the last solve, with the hold that it needed (FitLevel).
+// The terms of the last solve, with the hold that it needed (FitLevelHeld).
 std::vector<Term> TermsOfLastSolve(const Experiment& experiment, const FitResult& fit) {
   std::vector<Term> terms = experiment.fit.terms;
   if (!fit.levels.empty() && fit.levels.back().hold > 0) {

@@ -503,7 +503,7 @@ std::string PointsSentence(const Json& fit) {
           : "; their places on it did not move");
 }
 
-// Empty if no step needed a hold (FitLevel).
+// Empty if no step needed a hold (FitLevelHeld).
 std::string HoldSentence(const Json& fit) {
   double hold = 0;
   for (const Json& level : fit.at("levels")) {

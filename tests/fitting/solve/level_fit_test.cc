@@ -284,12 +284,12 @@ TEST(ScheduleStep, PointsAloneDoNotMakeVerticesRunAway) {
     both.observations.push_back(beside);
   }
   for (const Solver solver : {Solver::kCeres, Solver::kFastest}) {
-    const LevelSolution solution = FitLevel(both, std::vector<Term>{PointTerm{}}, solver);
+    const LevelSolution solution = FitLevelHeld(both, std::vector<Term>{PointTerm{}}, solver);
     EXPECT_GT(solution.summary.hold, 0);
     EXPECT_LT(solution.summary.max_move_mm, 10 * misfit_mm);
     EXPECT_EQ(solution.summary.terms.size(), 1u);
     EXPECT_LT(solution.summary.rms_after_mm, solution.summary.rms_before_mm);
-    EXPECT_EQ(FitLevel(seeds, std::vector<Term>{PointTerm{}}, solver).summary.hold, 0);
+    EXPECT_EQ(FitLevelHeld(seeds, std::vector<Term>{PointTerm{}}, solver).summary.hold, 0);
   }
 }
 
