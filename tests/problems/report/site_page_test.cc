@@ -4,6 +4,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
+#include <set>
 #include <sstream>
 
 #include "problems/subject/sites.h"
@@ -17,12 +21,18 @@ using ::testing::Not;
 
 const std::string kSource = SEMBLANCE_SOURCE_DIR;
 
-// As the shell lists configs/tables/*.yaml.
+// Every table that ships, in the order in which the shell lists configs/tables/*.yaml.
 std::vector<TissueTable> Tables() {
-  std::vector<TissueTable> tables;
-  for (const char* id : {"rhine_black", "rhine_caucasoid", "rhine_sw_indian", "t_table_2023"}) {
-    tables.push_back(ReadTissueTable(kSource + "/configs/tables/" + id + ".yaml"));
+  std::set<std::filesystem::path> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(kSource + "/configs/tables")) {
+    if (entry.path().extension() == ".yaml") {
+      paths.insert(entry.path());
+    }
   }
+  std::vector<TissueTable> tables;
+  std::ranges::transform(paths, std::back_inserter(tables), [](const std::filesystem::path& path) {
+    return ReadTissueTable(path.string());
+  });
   return tables;
 }
 
