@@ -163,6 +163,23 @@ void CheckAutoPlan(const Experiment& experiment, std::vector<OptionFault>& fault
   }
 }
 
+// `face: joint` runs the steps of a schedule, and its levels meet the data with the whole surface.
+void CheckJointPlan(const Experiment& experiment, std::vector<OptionFault>& faults) {
+  if (!std::holds_alternative<JointFace>(experiment.face)) {
+    return;
+  }
+  const SchedulePlan& plan = experiment.fit.plan;
+  if (!std::holds_alternative<ListedPlan>(plan) &&
+      !std::holds_alternative<CoarseToFinePlan>(plan)) {
+    faults.push_back({"fit.plan",
+                      "`face: joint` runs the steps of a schedule once; take `listed` or "
+                      "`coarse_to_fine`"});
+  } else if (PlanAim(plan) != FitAim::kSurface) {
+    faults.push_back({"fit.plan.aim",
+                      "`face: joint` fits the whole surface; leave it out, or take another face"});
+  }
+}
+
 void CheckReference(const Experiment& experiment, std::vector<OptionFault>& faults) {
   const auto* const reference = std::get_if<ReferenceFace>(&experiment.face);
   if (reference == nullptr) {
@@ -295,6 +312,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   CheckWayToFace(experiment, faults);
   CheckUncertainty(experiment, faults);
   CheckAutoPlan(experiment, faults);
+  CheckJointPlan(experiment, faults);
   CheckBust(experiment, faults);
   return faults;
 } catch (const Error& error) {  // the template cannot be used, so its levels are unknown
@@ -315,16 +333,24 @@ std::vector<std::string> UnusedOptions(const Experiment& experiment) {
     std::erase_if(paths, [](const std::string& path) {
       return path != "seeds.weight" && path != "first_fit";
     });
+  } else if (std::holds_alternative<JointFace>(face)) {
+    std::erase_if(paths, [](const std::string& path) {
+      return (path.starts_with("seeds") && path != "seeds.weight") || path == "rounds" ||
+             path.starts_with("fit.plan");
+    });
   }
   std::vector<std::string> notes;
   if (std::holds_alternative<PriorThenFit>(face)) {
     notes = UnusedFitOptions(experiment);
   }
+  const std::string instead = std::holds_alternative<PriorThenFit>(face)
+                                  ? "; face.seed_weight of prior_then_fit replaces it"
+                              : std::holds_alternative<JointFace>(face)
+                                  ? "; face.estimate.surface_worth replaces it"
+                                  : "";
   for (const std::string& path : paths) {
     notes.push_back(fmt::format("{}: `face: {}` does not use it{}", path, NameOf(face),
-                                path == "seeds.weight" && UsesPrior(face)
-                                    ? "; face.seed_weight of prior_then_fit replaces it"
-                                    : ""));
+                                path == "seeds.weight" ? instead : ""));
   }
   return notes;
 }

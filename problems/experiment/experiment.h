@@ -333,7 +333,8 @@ void Fields(Visitor& visit, Experiment& o) {
                          "thin_plate: the template, bent to their tips; fit: the template, fitted "
                          "to tips and implicit face level by level; prior: the most likely face of "
                          "the prior, given tips and implicit face; prior_then_fit: that face as "
-                         "the template of the fit"},
+                         "the template of the fit; joint: each step of the schedule solves for "
+                         "control vertices, coefficients of the prior and pose in one problem"},
         o.face);
   visit(FieldInfo{.name = "bust",
                   .doc = "the head, with ears, neck and eyes, into which the face is put for "

@@ -14,10 +14,12 @@
 
 #include "problems/experiment/dowel_projection.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/experiment/face_parts.h"
+#include "problems/experiment/joint_face.h"
+#include "problems/experiment/likely_face.h"
 #include "problems/face/edit_script.h"
 #include "problems/face/hspline_prior.h"
 #include "problems/face/prior_observations.h"
-#include "problems/subject/condition_depths.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
@@ -27,17 +29,6 @@
 
 namespace semblance::problems {
 namespace {
-
-TemplateFace InSubjectFrame(const TemplateFace& generic, const Similarity& face_from_template) {
-  TemplateFace placed = generic;
-  placed.surface = Transformed(generic.surface, face_from_template);
-  for (TemplateFeature& feature : placed.features) {
-    if (feature.region) {
-      feature.region = TransformedSphere(*feature.region, face_from_template);
-    }
-  }
-  return placed;
-}
 
 PlacedTemplate Place(const TemplateFace& generic, const std::vector<Dowel>& dowels_on_bone,
                      const DowelNetwork& network, const Experiment& experiment) {
@@ -139,31 +130,6 @@ void Weigh(const FitTarget& dowels, const PriorKnowledge& known, std::vector<Fit
   WeighSeeds(tips, known.features, *known.trust, seeds);
 }
 
-// Moves seeds from the triangles of the implicit face onto the surface itself. Triangles cut its
-// curves short, by an amount that depends on the place of the grid's cells.
-void LayOnField(const HSplineSurface& surface, const SeedOptions& options,
-                const ImplicitSurface* field, std::vector<FitPoint>& seeds) {
-  constexpr double kReach_mm = 2;
-  if (field == nullptr) {
-    return;
-  }
-  for (FitPoint& seed : seeds) {
-    const Vec3 direction = surface.LevelFrame(options.direction_level, seed.uv).Normal();
-    seed.position = FindOnLine(*field, seed.position, direction, kReach_mm).value_or(seed.position);
-  }
-}
-
-SeedResult MakeSeeds(const HSplineSurface& surface, const MeshQuery& query, const FaceInput& in,
-                     std::span<const Sphere> masks, const SeedSource& source) {
-  const auto* const options = std::get_if<SeedOptions>(&source);
-  if (options == nullptr) {
-    return {.points = {}, .masked = 0, .missed = 0, .folded = 0};
-  }
-  SeedResult seeding = SeedDowels(surface, query, in.implicit, masks, *options);
-  LayOnField(surface, *options, in.field, seeding.points);
-  return seeding;
-}
-
 // Fits the dowels first. Then each round takes seeds from the surface as it lies now and runs the
 // schedule with dowels and seeds (see seeding.h for the reason).
 FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInput& in,
@@ -189,39 +155,6 @@ FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInp
     result.emplace(FaceFit{std::move(seeding), std::move(target), std::move(fit)});
   }
   return std::move(*result);
-}
-
-// Residuals and their RMS, weighted as those of a fit, for a surface that the fit has not made.
-void MeasureResiduals(FaceFit& fitted) {
-  FitResult& fit = fitted.fit;
-  double all = 0, weight = 0, of_dowels = 0, dowel_weight = 0;
-  fit.residual_mm.clear();
-  for (std::size_t k = 0; k < fitted.target.points.size(); ++k) {
-    const FitPoint& point = fitted.target.points[k];
-    fit.residual_mm.push_back((fit.surface.Point(fit.uv[k]) - point.position).norm());
-    const double squared = point.weight * fit.residual_mm[k] * fit.residual_mm[k];
-    all += squared;
-    weight += point.weight;
-    if (point.role != PointRole::kSeed) {
-      of_dowels += squared;
-      dowel_weight += point.weight;
-    }
-  }
-  fit.point_rms_mm = std::sqrt(all / weight);
-  fit.dowel_rms_mm = std::sqrt(of_dowels / dowel_weight);
-}
-
-// A face without a fit, in the form of a fit's result.
-FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels) {
-  FitResult fit{.surface = std::move(surface)};
-  for (const FitPoint& point : dowels.points) {
-    fit.uv.push_back(point.uv);
-  }
-  fit.restored_features = 0;
-  fit.usable = true;
-  FaceFit unfitted{{.points = {}, .masked = 0, .missed = 0, .folded = 0}, dowels, std::move(fit)};
-  MeasureResiduals(unfitted);
-  return unfitted;
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -272,156 +205,6 @@ HSplineSurface UnderThinPlate(const HSplineSurface& surface, const PointPairs& p
     samples.push_back(plate(surface.Point(grid.UvAt(k))));
   }
   return SurfaceThrough(surface.shape(), grid, samples);
-}
-
-// ---------------------------------------------------------------------------------------------
-// The prior's most likely face
-// ---------------------------------------------------------------------------------------------
-
-// The model's points for dowels at sites that the prior lacks: under the points in which the rays
-// of the dowels meet the placed template.
-std::map<std::string, ModelPoint> OtherSites(const FitTarget& dowels, const LoadedPrior& prior) {
-  std::map<std::string, ModelPoint> others;
-  for (const FitPoint& point : dowels.points) {
-    if (!prior.face.sites.contains(point.label)) {
-      others[point.label] = prior.on_template.under[prior.on_template.grid.NearestTo(point.uv)];
-    }
-  }
-  return others;
-}
-
-bool HasOtherSites(const FacePrior& prior, const ShapeTarget& target) {
-  return std::ranges::any_of(target.tips,
-                             [&](const ShapeTip& tip) { return !prior.sites.contains(tip.label); });
-}
-
-// Moves the model's points of sites that the prior lacks to the points of the estimated face that
-// are nearest to the tips. They were found on a face that was only placed.
-void Reproject(const ShapeEstimate& shape, const FacePrior& prior, ShapeTarget& target) {
-  const MeshQuery query(TriMesh{shape.points, prior.model.mean.triangles});
-  for (ShapeTip& tip : target.tips) {
-    if (!prior.sites.contains(tip.label)) {
-      const MeshPoint at = query.Closest(tip.position);
-      tip.at = {at.triangle, at.weights};
-    }
-  }
-}
-
-// Estimates twice if the prior lacks a dowel's site. Only the second estimate computes the spread.
-ShapeEstimate Estimate(const FacePrior& prior, const PriorUse& use, ShapeTarget& target,
-                       const RunContext& context) {
-  if (HasOtherSites(prior, target)) {
-    const bool compute_spread = std::exchange(target.compute_spread, false);
-    Reproject(EstimateShape(prior.model, target, use.estimate, context), prior, target);
-    target.compute_spread = compute_spread;
-  }
-  return EstimateShape(prior.model, target, use.estimate, context);
-}
-
-// With depths of a table the person's build is unknown. The tips carry this into sigma. Around
-// sites without a dowel, for example where no bone was scanned, no tip does, so the deviation of
-// the site is added here.
-void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
-                         const TableDepthOptions& table, std::vector<double>& sigma_mm) {
-  constexpr double kUsualDepth_mm = 10;  // stands for the unknown depth in PublishedSd_mm
-  std::map<std::string, Vec3> places;
-  for (const auto& [site, at] : prior.sites) {
-    places[site] = FindPosition(at, prior.model.mean, prior.model.mean.points);
-  }
-  std::map<std::string, double> missing_mm;
-  for (const auto& [site, place] : places) {
-    if (std::ranges::find(dowels, site, &Dowel::site) == dowels.end()) {
-      Dowel none;
-      none.site = site;
-      none.depth_mm = kUsualDepth_mm;
-      missing_mm[site] = table.shared * PublishedSd_mm(none);
-    }
-  }
-  for (std::size_t v = 0; v < sigma_mm.size() && !missing_mm.empty(); ++v) {
-    const auto nearest = std::ranges::min_element(places, {}, [&](const auto& place) {
-      return (place.second - prior.model.mean.points[v]).squaredNorm();
-    });
-    if (const auto missing = missing_mm.find(nearest->first); missing != missing_mm.end()) {
-      sigma_mm[v] = std::hypot(sigma_mm[v], missing->second);
-    }
-  }
-}
-
-// Without a pose of the subject no rule applies.
-RuleMarks ApplySubjectRules(const FaceInput& in, const FacePrior& prior) {
-  return in.subject.basis.sites ? ApplyRules(in.experiment.rules, in.subject.points,
-                                             in.subject.basis.sites->skull_from_average, prior)
-                                : RuleMarks();
-}
-
-// The random seeds of the faces to draw. The first one may replace the most likely face.
-std::vector<std::uint64_t> ListDraws(const PriorUse& use, const UncertaintyOptions& options) {
-  std::vector<std::uint64_t> random_seeds;
-  if (use.draw > 0) {
-    random_seeds.push_back(use.draw);
-  }
-  for (int k = 0; k < options.samples; ++k) {
-    random_seeds.push_back(options.random_seed + k);
-  }
-  return random_seeds;
-}
-
-void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made) {
-  const HSplineSurface likely = made.fitted.fit.surface;
-  for (std::size_t k = 0; k < made.prior->drawn.size(); ++k) {
-    HSplineSurface drawn = MovedAsDrawn(likely, *made.prior, k, prior.face, prior.on_template);
-    if (use.draw > 0 && k == 0) {
-      made.fitted.fit.surface = std::move(drawn);
-      MeasureResiduals(made.fitted);
-    } else {
-      made.samples.push_back(std::move(drawn));
-    }
-  }
-}
-
-// A table's deviations are those of the population. The options split them into the errors that a
-// person's depths share and the rest. Conditioned on known depths of this person, the deviations
-// are the depths' own.
-TableDepthOptions SplitTableError(const TableDepthOptions& table, const Experiment& experiment) {
-  return IsConditioned(experiment.tissue) ? TableDepthOptions{.own = 1, .shared = 0} : table;
-}
-
-// The prior's most likely face as a placed template.
-MadeFace MostLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceInput& in,
-                        const RunContext& context) {
-  const LoadedPrior& prior = *in.prior;
-  const std::vector<Dowel>& dowels = in.subject.dowels_on_bone;
-  const TableDepthOptions parts = SplitTableError(use.table_depths, in.experiment);
-  const TableDepthOptions* const table =
-      in.experiment.tissue.depths == DepthSource::kTable ? &parts : nullptr;
-  const TriMesh* const implicit = in.implicit.triangles.empty() ? nullptr : &in.implicit;
-  ShapeTarget target =
-      PriorTarget(prior.face, dowels, table, implicit, OtherSites(placed.dowels, prior));
-  if (implicit != nullptr) {
-    ImplicitSpread spread =
-        ImplicitSpread_mm(use.implicit_spread, *implicit, in.shell, dowels, table, context.threads);
-    target.surface_sd_mm = std::move(spread.sd);
-    target.surface_error_mm = std::move(spread.error);
-  }
-  RuleMarks rules = ApplySubjectRules(in, prior.face);
-  target.marks = std::move(rules.marks);
-  target.draws = ListDraws(use, in.experiment.uncertainty);
-  target.compute_spread = in.tells_sigma || !target.draws.empty();
-  ShapeEstimate shape = Estimate(prior.face, use, target, context);
-  for (std::size_t k = 0; k < rules.rules.size(); ++k) {
-    rules.rules[k].residual_mm = shape.mark_residual_mm[k];
-  }
-  if (table != nullptr) {
-    WidenWhereNoDowelIs(prior.face, dowels, *table, shape.sigma_mm);
-  }
-  placed.face_from_template =
-      Composed(shape.subject_from_model, prior.on_template.mean_from_template);
-  placed.face = InSubjectFrame(in.generic, placed.face_from_template);
-  placed.face.surface =
-      MakeFaceSurface(shape, prior.face, prior.on_template, in.generic.surface.shape());
-  FaceFit unfitted = Unfitted(placed.face.surface, placed.dowels);
-  unfitted.fit.usable = shape.usable;
-  return {std::move(placed), std::move(unfitted), std::move(shape), std::move(rules.rules)};
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -478,7 +261,7 @@ void MeetDowels(const LoadedPrior& prior, MadeFace& made) {
 
 MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
-  MadeFace made = MostLikelyFace(o.use, std::move(placed), in, context);
+  MadeFace made = FindLikelyFace(o.use, std::move(placed), in, context).made;
   MeetDowels(*in.prior, made);
   TakeDraws(o.use, *in.prior, made);
   return made;
@@ -517,7 +300,7 @@ FitPlan PlanFitOnPrior(const PriorThenFit& o, const FaceInput& in) {
 
 MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
-  MadeFace made = MostLikelyFace(o.use, std::move(placed), in, context);
+  MadeFace made = FindLikelyFace(o.use, std::move(placed), in, context).made;
   const HSplineSurface& surface = made.placed.face.surface;
   for (FitPoint& point : made.placed.dowels.points) {
     if (!IsHeld(in.experiment.sites, point.label)) {
@@ -531,6 +314,11 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
   made.fitted = FitFace(PlanFitOnPrior(o, in), made.placed, in, known, context);
   TakeDraws(o.use, *in.prior, made);
   return made;
+}
+
+MadeFace MakeFace(const JointFace& o, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext& context) {
+  return MakeJointFace(o, std::move(placed), in, context);
 }
 
 }  // namespace

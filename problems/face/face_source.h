@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "problems/face/prior_observations.h"
+#include "problems/face/residual_field.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance::problems {
@@ -138,14 +139,35 @@ void Fields(Visitor& visit, PriorThenFit& o) {
   PriorUseFields(visit, o.use);
 }
 
+// One problem from dowels to face (joint_face.h): each step of the schedule solves for control
+// vertices, coefficients of the prior and pose together.
+struct JointFace {
+  static constexpr std::string_view kName = "joint";
+  ResidualFieldOptions residual;
+  PriorUse use;
+};
+template <class Visitor>
+void Fields(Visitor& visit, JointFace& o) {
+  visit(FieldInfo{.name = "residual",
+                  .doc = "how far, and over what distance, the face may deviate from the prior"},
+        o.residual);
+  PriorUseFields(visit, o.use);
+}
+
 using FaceSource = std::variant<AutoFace, FittedTemplate, PlacedFace, ThinPlateFace, ReferenceFace,
-                                PriorFace, PriorThenFit>;
+                                PriorFace, PriorThenFit, JointFace>;
 
 // Null for a face that does not use the prior.
 inline const PriorUse* FindPriorUse(const FaceSource& face) {
-  const auto* const prior = std::get_if<PriorFace>(&face);
-  const auto* const fitted = std::get_if<PriorThenFit>(&face);
-  return prior != nullptr ? &prior->use : fitted != nullptr ? &fitted->use : nullptr;
+  return std::visit(
+      [](const auto& way) -> const PriorUse* {
+        if constexpr (requires { way.use; }) {
+          return &way.use;
+        } else {
+          return nullptr;
+        }
+      },
+      face);
 }
 
 inline bool UsesPrior(const FaceSource& face) { return FindPriorUse(face) != nullptr; }

@@ -28,10 +28,8 @@ namespace fs = std::filesystem;
 PriorFace CoarsePriorFace(const FaceSource& method) {
   constexpr int kCentres = 30, kRounds = 5;
   PriorFace coarse;
-  if (const auto* fitted = std::get_if<PriorThenFit>(&method)) {
-    coarse.use = fitted->use;
-  } else if (const auto* prior = std::get_if<PriorFace>(&method)) {
-    coarse = *prior;
+  if (const PriorUse* const use = FindPriorUse(method)) {
+    coarse.use = *use;
   }
   ShapeFitOptions& estimate = coarse.use.estimate;
   estimate.field.centres = std::min(estimate.field.centres, kCentres);

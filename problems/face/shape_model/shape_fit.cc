@@ -3,7 +3,6 @@
 
 #include <ceres/cost_function.h>
 #include <ceres/loss_function.h>
-#include <ceres/normal_prior.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
 #include <fmt/format.h>
@@ -17,6 +16,7 @@
 #include <span>
 #include <utility>
 
+#include "problems/face/shape_model/shape_cost.h"
 #include "problems/face/shape_model/shape_model.h"
 #include "problems/face/shape_model/shape_posterior.h"
 #include "surfaces/base/error.h"
@@ -29,58 +29,6 @@ namespace {
 constexpr int kPoseRounds = 2;              // first rounds, which move the pose alone
 constexpr int kFirstSurfaceRound = 3;       // counted from 0; before, points would find wrong feet
 constexpr double kMoveTolerance_mm = 5e-3;  // ends the rounds; far below any error of the data
-
-// Residual whitening * (x - position), where x is the placed point of the observation. Parameter
-// blocks: the pose, the coefficients and, if there is one, the field.
-class ShapeCost final : public ceres::CostFunction {
- public:
-  // Both must outlive the cost.
-  ShapeCost(const ShapeFrame& frame, const ShapeObservation& observation);
-  bool Evaluate(const double* const* parameters, double* residuals,
-                double** jacobians) const override;
-
- private:
-  const ShapeFrame& frame_;
-  const ShapeObservation& seen_;
-};
-
-using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-ShapeCost::ShapeCost(const ShapeFrame& frame, const ShapeObservation& observation)
-    : frame_(frame), seen_(observation) {
-  set_num_residuals(static_cast<int>(seen_.whitening.rows()));
-  mutable_parameter_block_sizes()->push_back(7);
-  mutable_parameter_block_sizes()->push_back(static_cast<int>(seen_.row.modes.cols()));
-  if (seen_.row.field.size() > 0) {
-    mutable_parameter_block_sizes()->push_back(static_cast<int>(3 * seen_.row.field.size()));
-  }
-}
-
-bool ShapeCost::Evaluate(const double* const* parameters, double* residuals,
-                         double** jacobians) const {
-  const std::size_t modes = seen_.row.modes.cols(), field = 3 * seen_.row.field.size();
-  ShapeDerivatives derivatives;
-  const Vec3 x = PlacedPoint(frame_, seen_.row, {parameters[0], 7}, {parameters[1], modes},
-                             {field > 0 ? parameters[2] : nullptr, field}, &derivatives);
-  const Eigen::Index rows = seen_.whitening.rows();
-  Eigen::Map<Eigen::VectorXd>(residuals, rows) = seen_.whitening * (x - seen_.position);
-  if (jacobians == nullptr) {
-    return true;
-  }
-  RowMajor all(rows, 7 + modes + field);
-  for (Eigen::Index r = 0; r < rows; ++r) {
-    all.row(r) = DerivativeAlong(seen_.whitening.row(r).transpose(), seen_.row, derivatives);
-  }
-  Eigen::Index begin = 0;
-  for (std::size_t block = 0; block < parameter_block_sizes().size(); ++block) {
-    const int size = parameter_block_sizes()[block];
-    if (jacobians[block] != nullptr) {
-      Eigen::Map<RowMajor>(jacobians[block], rows, size) = all.middleCols(begin, size);
-    }
-    begin += size;
-  }
-  return true;
-}
 
 // ---------------------------------------------------------------------------------------------
 // Checks
@@ -283,7 +231,6 @@ class ShapeEstimator {
   void ObserveMarks();
   void ObserveSurface();
   void Solve(bool pose_alone);
-  void AddPriors(ceres::Problem& problem);
   void ComputeSpread(const RunContext& context, ShapeEstimate& result) const;
 
   const ShapeModel& model_;
@@ -329,19 +276,6 @@ void ShapeEstimator::ObserveTips() {
   }
 }
 
-ShapeRow MeanRow(const ShapeModel& model, const Eigen::MatrixXd& field,
-                 const std::vector<ModelPoint>& at) {
-  ShapeRow mean = PointRowAt(model, field, at.front());
-  for (std::size_t k = 1; k < at.size(); ++k) {
-    const ShapeRow row = PointRowAt(model, field, at[k]);
-    mean.mean += row.mean;
-    mean.modes += row.modes;
-    mean.field += row.field;
-  }
-  const auto count = static_cast<double>(at.size());
-  return {mean.mean / count, mean.modes / count, mean.field / count};
-}
-
 void ShapeEstimator::ObserveMarks() {
   for (const ShapeMark& mark : target_.marks) {
     seen_.push_back({.row = MeanRow(model_, field_, mark.at),
@@ -368,33 +302,14 @@ void ShapeEstimator::ObserveSurface() {
   }
 }
 
-void ShapeEstimator::AddPriors(ceres::Problem& problem) {
-  const auto add = [&](double* block, const Eigen::VectorXd& mean, const Eigen::VectorXd& sd) {
-    const Eigen::MatrixXd root = sd.cwiseInverse().asDiagonal();
-    problem.AddResidualBlock(new ceres::NormalPrior(root, mean), nullptr, block);
-  };
-  Eigen::VectorXd pose = Eigen::Map<const Eigen::VectorXd>(start_pose_.data(), 7);
-  pose[0] = 0;  // the model's own size
-  const Eigen::VectorXd sd = prior_.Deviations(parameters_);
-  add(parameters_.pose.data(), pose, sd.head(7));
-  const Eigen::Index k = parameters_.coefficients.size(), m = parameters_.field.size();
-  add(parameters_.coefficients.data(), Eigen::VectorXd::Zero(k), sd.segment(7, k));
-  if (m > 0) {
-    add(parameters_.field.data(), Eigen::VectorXd::Zero(m), sd.tail(m));
-  }
-}
-
 void ShapeEstimator::Solve(bool pose_alone) {
   ceres::Problem problem;
-  AddPriors(problem);
+  AddShapePriors(prior_, start_pose_, parameters_, problem);
+  const std::vector<double*> blocks = ShapeBlocks(parameters_);
   for (const ShapeObservation& one : seen_) {
-    std::vector<double*> blocks = {parameters_.pose.data(), parameters_.coefficients.data()};
-    if (parameters_.field.size() > 0) {
-      blocks.push_back(parameters_.field.data());
-    }
     auto* const loss = new ceres::ScaledLoss(new ceres::HuberLoss(one.loss_width), one.weight,
                                              ceres::TAKE_OWNERSHIP);
-    problem.AddResidualBlock(new ShapeCost(frame_, one), loss, blocks);
+    problem.AddResidualBlock(MakeShapeCost(frame_, one), loss, blocks);
   }
   if (pose_alone) {
     problem.SetParameterBlockConstant(parameters_.coefficients.data());
@@ -466,10 +381,15 @@ ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
   if (target_.compute_spread) {
     ComputeSpread(context, result);
   }
-  for (const ShapeTip& tip : target_.tips) {
+  result.frame = frame_;
+  result.parameters = parameters_;
+  result.field = field_;
+  for (std::size_t k = 0; k < target_.tips.size(); ++k) {  // the first observations are the tips
+    const ShapeTip& tip = target_.tips[k];
+    const Vec3 at = FindPosition(tip.at, model_.mean, placed_.points);
     result.tip_residual_mm.push_back(
-        (tip.position - FindPosition(tip.at, model_.mean, placed_.points))
-            .dot(NormalAt(tip.at, model_.mean, normals_)));
+        (tip.position - at).dot(NormalAt(tip.at, model_.mean, normals_)));
+    result.tip_weight.push_back(LossWeight(seen_[k], at));
   }
   for (const ShapeMark& mark : target_.marks) {
     Vec3 at = Vec3::Zero();

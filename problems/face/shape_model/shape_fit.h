@@ -207,10 +207,17 @@ struct ShapeEstimate {
   std::vector<double> sigma_mm;
   // Distance from the shape to each tip along the shape's normal, > 0 outside.
   std::vector<double> tip_residual_mm;
+  // The factor in (0, 1] by which the loss reduced the pull of each tip in the last round. A small
+  // one marks a dowel that contradicts the model, the other dowels and the surface.
+  std::vector<double> tip_weight;
   std::vector<double> mark_residual_mm;  // from the shape to each mark, along its direction
   std::vector<std::vector<Vec3>> drawn;  // points of each drawn shape
-  double field_rms_mm = kNaN;            // root mean square of the smooth field over the points
-  int surface_points = -1;               // points drawn to the surface in the last round
+  // The solution itself: x of shape_model.h for each point of the model.
+  ShapeFrame frame;
+  ShapeParameters parameters;
+  Eigen::MatrixXd field;       // of SmoothFieldFactor, one row per point of the model
+  double field_rms_mm = kNaN;  // root mean square of the smooth field over the points
+  int surface_points = -1;     // points drawn to the surface in the last round
   int rounds = -1;
   double last_move_mm = kNaN;  // largest move of a point in the last round
   bool usable = false;

@@ -135,6 +135,19 @@ ShapeRow PointRowAt(const ShapeModel& model, const Eigen::MatrixXd& field, const
   return row;
 }
 
+ShapeRow MeanRow(const ShapeModel& model, const Eigen::MatrixXd& field,
+                 const std::vector<ModelPoint>& at) {
+  ShapeRow mean = PointRowAt(model, field, at.front());
+  for (std::size_t k = 1; k < at.size(); ++k) {
+    const ShapeRow row = PointRowAt(model, field, at[k]);
+    mean.mean += row.mean;
+    mean.modes += row.modes;
+    mean.field += row.field;
+  }
+  const auto count = static_cast<double>(at.size());
+  return {mean.mean / count, mean.modes / count, mean.field / count};
+}
+
 Vec3 PlacedPoint(const ShapeFrame& frame, const ShapeRow& row, std::span<const double> pose,
                  std::span<const double> coefficients, std::span<const double> field,
                  ShapeDerivatives* derivatives) {

@@ -75,6 +75,9 @@ struct ShapeRow {
 // field: n x m, one row per point of the model.
 ShapeRow PointRowAt(const ShapeModel& model, const Eigen::MatrixXd& field, const ModelPoint& at);
 ShapeRow VertexRow(const ShapeModel& model, const Eigen::MatrixXd& field, int vertex);
+// The row of the mean of some points, of one at least.
+ShapeRow MeanRow(const ShapeModel& model, const Eigen::MatrixXd& field,
+                 const std::vector<ModelPoint>& at);
 
 // Derivatives of a placed point. The derivatives by w and a follow from `linear`.
 struct ShapeDerivatives {

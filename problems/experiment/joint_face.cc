@@ -1,0 +1,304 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/experiment/joint_face.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "problems/experiment/face_parts.h"
+#include "problems/experiment/likely_face.h"
+#include "problems/face/hspline_prior.h"
+#include "problems/face/joint_fit.h"
+#include "problems/subject/extra_sites.h"
+#include "surfaces/hspline_query/hspline_project.h"
+#include "surfaces/mesh/mesh_query.h"
+
+namespace semblance::problems {
+namespace {
+
+// A dowel's tip, the (u,v) of its site and the foot to which it has slid.
+struct SlidingDowel {
+  FitPoint point;  // uv: of the site
+  Vec2 foot_uv = Vec2::Constant(kNaN);
+  bool is_held = false;
+  Vec3 direction = Vec3::Zero();  // of a further error, as in ShapeTip
+  double along_sd_mm = 0;
+};
+
+// The implicit face as an observed surface.
+class ImplicitObserver {
+ public:
+  ImplicitObserver(const TriMesh& implicit, const ShapeTarget& target)
+      : mesh_(implicit),
+        sd_mm_(target.surface_sd_mm),
+        query_(implicit),
+        normals_(VertexNormals(implicit)) {}
+
+  const MeshQuery& query() const { return query_; }
+
+  SurfaceObservation Observe(const FitPoint& seed, const ShapeFitOptions& options,
+                             double weight) const {
+    const MeshPoint at = query_.Closest(seed.position);
+    const ModelPoint place{at.triangle, at.weights};
+    const Vec3 normal = FindPosition(place, mesh_, normals_).normalized();
+    const Triangle& t = mesh_.triangles[at.triangle];
+    const double sd_mm = sd_mm_.empty()
+                             ? options.surface_sd_mm
+                             : at.weights.dot(Vec3(sd_mm_[t[0]], sd_mm_[t[1]], sd_mm_[t[2]]));
+    return {.uv = seed.uv,
+            .position = seed.position,
+            .whitening = normal.transpose() / sd_mm,
+            .loss_width = options.surface_loss_width,
+            .weight = weight};
+  }
+
+ private:
+  const TriMesh& mesh_;
+  const std::vector<double>& sd_mm_;
+  MeshQuery query_;
+  std::vector<Vec3> normals_;
+};
+
+// The rules' marks as observations of the model.
+std::vector<ShapeObservation> ObserveMarks(const ShapeTarget& target, const ShapeModel& model,
+                                           const Eigen::MatrixXd& field,
+                                           const ShapeFitOptions& options) {
+  std::vector<ShapeObservation> marks;
+  for (const ShapeMark& mark : target.marks) {
+    marks.push_back({.row = MeanRow(model, field, mark.at),
+                     .position = mark.position,
+                     .whitening = mark.direction.transpose() / mark.sd_mm,
+                     .loss_width = options.tip_loss_width});
+  }
+  return marks;
+}
+
+// The steps of the plan, then those of its sweeps: all its levels, coarse to fine, at fraction 1.
+std::vector<ScheduleStep> AllSteps(const SchedulePlan& plan) {
+  std::vector<ScheduleStep> steps = PlanSteps(plan);
+  std::set<int> levels;
+  for (const ScheduleStep& step : steps) {
+    levels.insert(step.level);
+  }
+  const auto* const listed = std::get_if<ListedPlan>(&plan);
+  const auto* const in_order = std::get_if<CoarseToFinePlan>(&plan);
+  const int sweeps = listed != nullptr     ? listed->sweeps
+                     : in_order != nullptr ? in_order->sweeps
+                                           : 0;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    std::ranges::transform(levels, std::back_inserter(steps), [](int level) {
+      return ScheduleStep{level, 1};
+    });
+  }
+  return steps;
+}
+
+class JointFitter {
+ public:
+  JointFitter(const JointFace& options, LikelyFace likely, const FaceInput& in,
+              const RunContext& context)
+      : options_(options),
+        in_(in),
+        context_(context),
+        target_(std::move(likely.target)),
+        made_(std::move(likely.made)),
+        state_{made_.placed.face.surface, made_.prior->frame, made_.prior->parameters},
+        features_(FeaturesOn(*made_.prior, in.prior->face)) {
+    const ShapeFitOptions& estimate = options.use.estimate;
+    weights_ = {.residual = options.residual,
+                .prior = {.scale_sd = estimate.scale_sd,
+                          .mode_sd = estimate.mode_sd,
+                          .population_sd = estimate.population_sd},
+                .start_pose = state_.parameters.pose};
+    data_.marks = ObserveMarks(target_, in.prior->face.model, made_.prior->field, estimate);
+    PlaceDowels();
+    if (!in.implicit.triangles.empty()) {
+      implicit_.emplace(in.implicit, target_);
+    }
+  }
+
+  MadeFace Run() {
+    for (int round = 0; round < in_.experiment.rounds; ++round) {
+      context_.Report("fit", fmt::format("round {} of {}", round + 1, in_.experiment.rounds));
+      Seed();
+      levels_.clear();
+      for (const ScheduleStep& step : AllSteps(in_.experiment.fit.plan)) {
+        Step(step);
+      }
+    }
+    return Result();
+  }
+
+ private:
+  // The (u,v) of a dowel's site on the model; elsewhere the point of the face nearest to the tip.
+  void PlaceDowels() {
+    const std::map<std::string, Vec2>& own = made_.placed.face.site_uv;
+    for (FitPoint& point : made_.placed.dowels.points) {
+      SlidingDowel dowel{.point = point, .is_held = IsHeld(in_.experiment.sites, point.label)};
+      if (const auto site = own.find(point.label); !dowel.is_held && site != own.end()) {
+        dowel.point.uv = site->second;
+      } else if (!dowel.is_held) {
+        dowel.point.uv = ProjectFrom(state_.surface, point.position, point.uv).uv;
+      }
+      const auto tip = std::ranges::find(target_.tips, point.label, &ShapeTip::label);
+      if (tip != target_.tips.end()) {
+        dowel.direction = tip->direction;
+        dowel.along_sd_mm = tip->along_sd_mm;
+      }
+      dowel.foot_uv = dowel.point.uv;
+      dowels_.push_back(dowel);
+    }
+  }
+
+  void Seed() {
+    data_.seeds.clear();
+    seeding_ = implicit_ ? MakeSeeds(state_.surface, implicit_->query(), in_,
+                                     TemplateMasks(made_.placed.face), in_.experiment.seeds)
+                         : SeedResult{.points = {}, .masked = 0, .missed = 0, .folded = 0};
+    std::erase_if(seeding_.points, [&](const FitPoint& seed) { return !IsTrusted(seed.position); });
+    for (FitPoint& seed : seeding_.points) {
+      const auto count = static_cast<double>(seeding_.points.size());
+      seed.weight = options_.use.estimate.surface_worth / count;
+      data_.seeds.push_back(implicit_->Observe(seed, options_.use.estimate, seed.weight));
+    }
+  }
+
+  // A seed counts near dowels and away from nose, mouth and eyes, as points of the estimate do.
+  bool IsTrusted(const Vec3& p) const {
+    const double range_mm = options_.use.estimate.surface_range_mm;
+    return std::ranges::none_of(features_,
+                                [&](const Sphere& feature) {
+                                  return (feature.center - p).norm() < feature.radius_mm;
+                                }) &&
+           std::ranges::any_of(dowels_, [&](const SlidingDowel& dowel) {
+             return (dowel.point.position - p).norm() < range_mm;
+           });
+  }
+
+  void Step(const ScheduleStep& step) {
+    context_.ThrowIfStopped();
+    SlideDowels();
+    data_.dowels.clear();
+    for (const SlidingDowel& dowel : dowels_) {
+      ObserveDowel(dowel);
+    }
+    levels_.push_back(SolveJointStep(ModelOf(step.level), data_, weights_, step, state_));
+  }
+
+  void SlideDowels() {
+    double farthest_mm = 0;
+    for (SlidingDowel& dowel : dowels_) {
+      if (dowel.is_held) {
+        continue;
+      }
+      const Vec2 foot = ProjectFrom(state_.surface, dowel.point.position, dowel.foot_uv).uv;
+      farthest_mm = std::max(
+          farthest_mm, (state_.surface.Point(foot) - state_.surface.Point(dowel.foot_uv)).norm());
+      dowel.foot_uv = foot;
+    }
+    slides_.push_back({.before = {}, .after = {}, .max_move_mm = farthest_mm});
+  }
+
+  // Tight along the normal at the foot, loose across it at the site.
+  void ObserveDowel(const SlidingDowel& dowel) {
+    const ShapeFitOptions& estimate = options_.use.estimate;
+    const Vec3 normal = state_.surface.Frame(dowel.foot_uv).Normal();
+    const double normal_sd_mm =
+        std::hypot(estimate.tip_normal_sd_mm, dowel.along_sd_mm * normal.dot(dowel.direction));
+    const Vec3 across = normal.unitOrthogonal();
+    Eigen::Matrix<double, 2, 3> tangents;
+    tangents << across.transpose(), normal.cross(across).transpose();
+    SurfaceObservation seen{.uv = dowel.foot_uv,
+                            .position = dowel.point.position,
+                            .whitening = normal.transpose() / normal_sd_mm,
+                            .loss_width = estimate.tip_loss_width,
+                            .weight = dowel.point.weight};
+    data_.dowels.push_back(seen);
+    seen.uv = dowel.point.uv;
+    seen.whitening = tangents / estimate.tip_tangent_sd_mm;
+    data_.dowels.push_back(seen);
+  }
+
+  const VertexModel& ModelOf(int level) {
+    const auto found = models_.find(level);
+    return found != models_.end()
+               ? found->second
+               : models_
+                     .emplace(level,
+                              MakeVertexModel(in_.prior->face, in_.prior->on_template,
+                                              made_.prior->field, state_.surface.shape(), level))
+                     .first->second;
+  }
+
+  MadeFace Result() {
+    FitResult fit{.surface = state_.surface, .levels = levels_, .relaxations = slides_};
+    fit.restored_features = 0;
+    fit.usable = std::ranges::all_of(levels_, &LevelSummary::usable);
+    FitTarget points;
+    for (const SlidingDowel& dowel : dowels_) {
+      points.points.push_back(dowel.point);
+      fit.uv.push_back(dowel.foot_uv);
+    }
+    for (const FitPoint& seed : seeding_.points) {
+      points.points.push_back(seed);
+      fit.uv.push_back(seed.uv);
+    }
+    made_.fitted = {std::move(seeding_), std::move(points), std::move(fit)};
+    MeasureResiduals(made_.fitted);
+    MoveModel();
+    return std::move(made_);
+  }
+
+  // The model at the solution, and with it the shapes that were drawn.
+  void MoveModel() {
+    ShapeEstimate& estimate = *made_.prior;
+    estimate.parameters = state_.parameters;
+    estimate.coefficients = state_.parameters.coefficients;
+    estimate.subject_from_model = MakeSimilarity(state_.frame, state_.parameters);
+    const std::vector<Vec3> moved =
+        PlacedPoints(state_.frame, in_.prior->face.model, estimate.field, state_.parameters);
+    for (std::vector<Vec3>& drawn : estimate.drawn) {
+      for (std::size_t v = 0; v < drawn.size(); ++v) {
+        drawn[v] += moved[v] - estimate.points[v];
+      }
+    }
+    estimate.points = moved;
+  }
+
+  const JointFace& options_;
+  const FaceInput& in_;
+  const RunContext& context_;
+  ShapeTarget target_;
+  MadeFace made_;
+  JointState state_;
+  std::vector<Sphere> features_;
+  JointWeights weights_;
+  JointData data_;
+  std::vector<SlidingDowel> dowels_;
+  std::optional<ImplicitObserver> implicit_;
+  SeedResult seeding_;
+  std::map<int, VertexModel> models_;  // by level
+  std::vector<LevelSummary> levels_;
+  std::vector<RelaxationSummary> slides_;
+};
+
+}  // namespace
+
+MadeFace MakeJointFace(const JointFace& options, PlacedTemplate placed, const FaceInput& in,
+                       const RunContext& context) {
+  JointFitter fitter(options, FindLikelyFace(options.use, std::move(placed), in, context), in,
+                     context);
+  MadeFace made = fitter.Run();
+  TakeDraws(options.use, *in.prior, made);
+  return made;
+}
+
+}  // namespace semblance::problems

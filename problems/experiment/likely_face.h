@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The most likely face of a statistical model, given a subject's dowels and implicit face.
+#pragma once
+
+#include "problems/experiment/make_face.h"
+#include "problems/face/face_source.h"
+
+namespace semblance::problems {
+
+struct LikelyFace {
+  MadeFace made;       // the face as a placed template that was not fitted
+  ShapeTarget target;  // what it was estimated from; refers to in.implicit
+};
+
+// Throws InputError as PriorTarget and EstimateShape do; Cancelled.
+LikelyFace FindLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceInput& in,
+                          const RunContext& context);
+
+// Adds uncertainty.samples random faces to `made`. With use.draw > 0 a random face also replaces
+// the face itself.
+void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made);
+
+// The part of a table's deviations by which each depth errs alone, and the part that all share.
+TableDepthOptions SplitTableError(const TableDepthOptions& table, const Experiment& experiment);
+
+}  // namespace semblance::problems

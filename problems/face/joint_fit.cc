@@ -1,0 +1,389 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/face/joint_fit.h"
+
+#include <ceres/cost_function.h>
+#include <ceres/loss_function.h>
+#include <ceres/problem.h>
+#include <ceres/solver.h>
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "problems/face/shape_model/shape_cost.h"
+#include "surfaces/base/error.h"
+
+namespace semblance::problems {
+namespace {
+
+using BlockRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+// The model's row of a point of the level's B-spline: a weighted sum of its vertices' rows.
+ShapeRow RowAt(const VertexModel& model, const Stencil& stencil) {
+  const ShapeRow& first = model.rows[stencil.index[0]];
+  ShapeRow sum{Vec3::Zero(), Eigen::Matrix3Xd::Zero(3, first.modes.cols()),
+               Eigen::RowVectorXd::Zero(first.field.size())};
+  for (int k = 0; k < 16; ++k) {
+    const ShapeRow& row = model.rows[stencil.index[k]];
+    sum.mean += stencil.weight[k] * row.mean;
+    sum.modes += stencil.weight[k] * row.modes;
+    sum.field += stencil.weight[k] * row.field;
+  }
+  return sum;
+}
+
+// Residual whitening (sum_k weight_k r_k + model(pose, w, a) + detail - position). Blocks: those of
+// the model's parameters (ShapeBlocks), then the deviations r_k of sixteen vertices.
+class SurfaceCost final : public ceres::CostFunction {
+ public:
+  // detail: what finer levels add to the surface there. frame must outlive the cost.
+  SurfaceCost(const ShapeFrame& frame, ShapeRow row, const Stencil& stencil,
+              const SurfaceObservation& seen, const Vec3& detail)
+      : frame_(frame),
+        row_(std::move(row)),
+        stencil_(stencil),
+        position_(seen.position - detail),
+        whitening_(seen.whitening) {
+    set_num_residuals(static_cast<int>(whitening_.rows()));
+    std::vector<int>& sizes = *mutable_parameter_block_sizes();
+    sizes = {7, static_cast<int>(row_.modes.cols())};
+    if (row_.field.size() > 0) {
+      sizes.push_back(static_cast<int>(3 * row_.field.size()));
+    }
+    first_vertex_ = sizes.size();
+    sizes.insert(sizes.end(), 16, 3);
+  }
+
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override {
+    const std::size_t modes = row_.modes.cols(), field = 3 * row_.field.size();
+    ShapeDerivatives derivatives;
+    Vec3 point = PlacedPoint(frame_, row_, {parameters[0], 7}, {parameters[1], modes},
+                             {field > 0 ? parameters[2] : nullptr, field}, &derivatives);
+    for (int k = 0; k < 16; ++k) {
+      point += stencil_.weight[k] * Eigen::Map<const Vec3>(parameters[first_vertex_ + k]);
+    }
+    const Eigen::Index rows = whitening_.rows();
+    Eigen::Map<Eigen::VectorXd>(residuals, rows) = whitening_ * (point - position_);
+    if (jacobians != nullptr) {
+      WriteModelJacobian(derivatives, jacobians);
+      WriteVertexJacobian(jacobians + first_vertex_);
+    }
+    return true;
+  }
+
+ private:
+  void WriteModelJacobian(const ShapeDerivatives& derivatives, double** jacobians) const {
+    Eigen::MatrixXd all(whitening_.rows(), 7 + row_.modes.cols() + 3 * row_.field.size());
+    for (Eigen::Index r = 0; r < whitening_.rows(); ++r) {
+      all.row(r) = DerivativeAlong(whitening_.row(r).transpose(), row_, derivatives);
+    }
+    WriteShapeJacobian(all, row_, jacobians);
+  }
+
+  void WriteVertexJacobian(double** jacobians) const {
+    for (int k = 0; k < 16; ++k) {
+      if (jacobians[k] != nullptr) {
+        Eigen::Map<BlockRows>(jacobians[k], whitening_.rows(), 3) = stencil_.weight[k] * whitening_;
+      }
+    }
+  }
+
+  const ShapeFrame& frame_;
+  ShapeRow row_;
+  Stencil stencil_;
+  Vec3 position_;
+  Eigen::Matrix<double, Eigen::Dynamic, 3> whitening_;
+  std::size_t first_vertex_ = 0;
+};
+
+// Residual sum_k weight_k r_k of a row of the residual field.
+class FieldCost final : public ceres::CostFunction {
+ public:
+  explicit FieldCost(std::vector<double> weights) : weights_(std::move(weights)) {
+    set_num_residuals(3);
+    mutable_parameter_block_sizes()->assign(weights_.size(), 3);
+  }
+
+  bool Evaluate(const double* const* parameters, double* residuals,
+                double** jacobians) const override {
+    Eigen::Map<Vec3> sum(residuals);
+    sum.setZero();
+    for (std::size_t k = 0; k < weights_.size(); ++k) {
+      sum += weights_[k] * Eigen::Map<const Vec3>(parameters[k]);
+      if (jacobians != nullptr && jacobians[k] != nullptr) {
+        Eigen::Map<Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>{jacobians[k]} =
+            weights_[k] * Mat3::Identity();
+      }
+    }
+    return true;
+  }
+
+ private:
+  std::vector<double> weights_;
+};
+
+// The problem of one step. Its blocks are the deviations of the vertices and the parameters.
+class JointStep {
+ public:
+  JointStep(const VertexModel& model, const JointData& data, const JointWeights& weights,
+            const JointState& state)
+      : model_(model),
+        surface_(state.surface),
+        frame_(state.frame),
+        net_(state.surface.Net(model.level)),
+        parameters_(state.parameters) {
+    for (std::size_t i = 0; i < net_.vertices.size(); ++i) {
+      deviations_.push_back(net_.vertices[i] - PlacedPoint(frame_, model.rows[i], parameters_));
+    }
+    Add("dowels", [&] { AddObservations(data.dowels); });
+    Add("seeds", [&] { AddObservations(data.seeds); });
+    Add("marks", [&] { AddMarks(data.marks); });
+    Add("residual_field", [&] { AddResidualField(weights.residual); });
+    Add("face_model",
+        [&] { AddShapePriors(weights.prior, weights.start_pose, parameters_, problem_); });
+  }
+
+  LevelSummary Solve() {
+    LevelSummary summary;
+    summary.level = model_.level;
+    summary.free_vertices = static_cast<int>(deviations_.size());
+    summary.solver = "ceres";
+    for (const Part& part : parts_) {
+      summary.terms.push_back({.term = part.name, .before = Cost(part), .after = kNaN});
+    }
+    const ceres::Solver::Summary solved = RunCeres();
+    for (std::size_t k = 0; k < parts_.size(); ++k) {
+      summary.terms[k].after = Cost(parts_[k]);
+    }
+    summary.iterations = static_cast<int>(solved.iterations.size()) - 1;
+    summary.termination = ceres::TerminationTypeToString(solved.termination_type);
+    summary.usable = solved.IsSolutionUsable();
+    return summary;
+  }
+
+  // The vertices at the solution.
+  ControlNet Net() const {
+    ControlNet net = net_;
+    for (std::size_t i = 0; i < net.vertices.size(); ++i) {
+      net.vertices[i] = PlacedPoint(frame_, model_.rows[i], parameters_) + deviations_[i];
+    }
+    return net;
+  }
+
+  const ShapeParameters& parameters() const { return parameters_; }
+
+ private:
+  // A group of residual blocks, and its name in the summary.
+  struct Part {
+    const char* name;
+    std::vector<ceres::ResidualBlockId> blocks;
+  };
+
+  // Runs `add`, and makes a part of the residual blocks that it added, if there are some.
+  void Add(const char* name, const auto& add) {
+    std::vector<ceres::ResidualBlockId> before, after;
+    problem_.GetResidualBlocks(&before);
+    add();
+    problem_.GetResidualBlocks(&after);
+    if (after.size() > before.size()) {
+      parts_.push_back({name, {after.begin() + std::ssize(before), after.end()}});
+    }
+  }
+
+  void AddObservations(const std::vector<SurfaceObservation>& seen) {
+    for (const SurfaceObservation& one : seen) {
+      const Stencil stencil = StencilAt(surface_.shape(), model_.level, one.uv);
+      const Vec3 detail = surface_.Point(one.uv) - stencil.Apply(net_);
+      std::vector<double*> blocks = ShapeBlocks(parameters_);
+      for (const int vertex : stencil.index) {
+        blocks.push_back(deviations_[vertex].data());
+      }
+      problem_.AddResidualBlock(
+          new SurfaceCost(frame_, RowAt(model_, stencil), stencil, one, detail),
+          MakeLoss(one.loss_width, one.weight), blocks);
+    }
+  }
+
+  void AddMarks(const std::vector<ShapeObservation>& marks) {
+    for (const ShapeObservation& mark : marks) {
+      problem_.AddResidualBlock(MakeShapeCost(frame_, mark), MakeLoss(mark.loss_width, mark.weight),
+                                ShapeBlocks(parameters_));
+    }
+  }
+
+  void AddResidualField(const ResidualFieldOptions& options) {
+    for (FieldRow& row : MakeFieldRows(net_, options)) {
+      std::vector<double*> blocks;
+      for (const int vertex : row.index) {
+        blocks.push_back(deviations_[vertex].data());
+      }
+      problem_.AddResidualBlock(new FieldCost(std::move(row.weight)), nullptr, blocks);
+    }
+  }
+
+  static ceres::LossFunction* MakeLoss(double width, double weight) {
+    return new ceres::ScaledLoss(new ceres::HuberLoss(width), weight, ceres::TAKE_OWNERSHIP);
+  }
+
+  ceres::Solver::Summary RunCeres() {
+    ceres::Solver::Options options;
+    options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+    options.num_threads = 1;
+    options.max_num_iterations = 50;
+    // Rotation and losses are not linear, so steps converge linearly; 1e-9 of the cost is far below
+    // a micrometre.
+    options.function_tolerance = 1e-9;
+    options.logging_type = ceres::SILENT;
+    ceres::Solver::Summary summary;
+    ceres::Solve(options, &problem_, &summary);
+    return summary;
+  }
+
+  // Ceres' cost is half of ours.
+  double Cost(const Part& part) {
+    ceres::Problem::EvaluateOptions options;
+    options.residual_blocks = part.blocks;
+    double cost = kNaN;
+    problem_.Evaluate(options, &cost, nullptr, nullptr, nullptr);
+    return 2 * cost;
+  }
+
+  const VertexModel& model_;
+  const HSplineSurface& surface_;
+  const ShapeFrame frame_;
+  const ControlNet net_;  // at the start
+  ShapeParameters parameters_;
+  std::vector<Vec3> deviations_;
+  ceres::Problem problem_;
+  std::vector<Part> parts_;
+};
+
+// from + fraction (to - from).
+ShapeParameters PartOfWay(const ShapeParameters& from, const ShapeParameters& to, double fraction) {
+  ShapeParameters part = from;
+  for (std::size_t k = 0; k < part.pose.size(); ++k) {
+    part.pose[k] += fraction * (to.pose[k] - from.pose[k]);
+  }
+  part.coefficients += fraction * (to.coefficients - from.coefficients);
+  part.field += fraction * (to.field - from.field);
+  return part;
+}
+
+void MoveTowards(const ControlNet& solved, double fraction, HSplineSurface& surface,
+                 LevelSummary& summary) {
+  ControlNet net = surface.Net(summary.level);
+  summary.max_move_mm = 0;
+  summary.moved_vertices = 0;
+  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+    const Vec3 move = fraction * (solved.vertices[k] - net.vertices[k]);
+    net.vertices[k] += move;
+    summary.max_move_mm = std::max(summary.max_move_mm, move.norm());
+    summary.moved_vertices += move.norm() >= kLeastMove_mm ? 1 : 0;
+  }
+  surface.SetNet(summary.level, net);
+}
+
+// The weighted root mean square distance of the surface from dowels and seeds.
+double ObservedRms_mm(const JointData& data, const HSplineSurface& surface) {
+  double sum = 0, weights = 0;
+  for (const auto* const list : {&data.dowels, &data.seeds}) {
+    for (const SurfaceObservation& one : *list) {
+      sum += one.weight * (surface.Point(one.uv) - one.position).squaredNorm();
+      weights += one.weight;
+    }
+  }
+  return std::sqrt(sum / weights);
+}
+
+void CheckModel(const VertexModel& model, const HSplineShape& shape) {
+  if (model.level < 0 || model.level > shape.max_level ||
+      std::ssize(model.rows) != shape.Columns(model.level) * shape.Rows(model.level)) {
+    throw InputError(fmt::format(
+        "joint fit: {} vertices of level {}; give the model of a level that the surface has",
+        model.rows.size(), model.level));
+  }
+}
+
+// The net of one vector per sample of the template's grid, which is that of a point of the model.
+ControlNet NetOfModel(const FacePrior& prior, const PriorOnTemplate& on_template,
+                      const HSplineShape& shape, int level, const auto& value_at_vertex) {
+  std::vector<Vec3> samples;
+  samples.reserve(on_template.under.size());
+  for (const ModelPoint& under : on_template.under) {
+    const Triangle& t = prior.model.mean.triangles[under.triangle];
+    samples.emplace_back(under.weights[0] * value_at_vertex(t[0]) +
+                         under.weights[1] * value_at_vertex(t[1]) +
+                         under.weights[2] * value_at_vertex(t[2]));
+  }
+  return NetThrough(shape, level, on_template.grid, samples);
+}
+
+void AddModes(const FacePrior& prior, const auto& net_of, VertexModel& model) {
+  for (Eigen::Index mode = 0; mode < prior.model.Modes(); ++mode) {
+    const ControlNet net = net_of(
+        [&](int v) -> Vec3 { return prior.model.modes.block<3, 1>(3 * Eigen::Index{v}, mode); });
+    for (std::size_t i = 0; i < net.vertices.size(); ++i) {
+      model.rows[i].modes.col(mode) = net.vertices[i];
+    }
+  }
+}
+
+// Three columns of the field at a time, as x, y and z of one net.
+void AddField(const Eigen::MatrixXd& field, const auto& net_of, VertexModel& model) {
+  for (Eigen::Index first = 0; first < field.cols(); first += 3) {
+    const Eigen::Index count = std::min<Eigen::Index>(3, field.cols() - first);
+    const ControlNet net = net_of([&](int v) -> Vec3 {
+      Vec3 values = Vec3::Zero();
+      values.head(count) = field.row(v).segment(first, count).transpose();
+      return values;
+    });
+    for (std::size_t i = 0; i < net.vertices.size(); ++i) {
+      model.rows[i].field.segment(first, count) = net.vertices[i].head(count).transpose();
+    }
+  }
+}
+
+}  // namespace
+
+VertexModel MakeVertexModel(const FacePrior& prior, const PriorOnTemplate& on_template,
+                            const Eigen::MatrixXd& field, const HSplineShape& shape, int level) {
+  std::vector<Vec3> samples;
+  for (std::size_t k = 0; k < on_template.under.size(); ++k) {
+    samples.emplace_back(
+        FindPosition(on_template.under[k], prior.model.mean, prior.model.mean.points) +
+        on_template.beside[k]);
+  }
+  VertexModel model{.level = level, .rows = {}};
+  for (const Vec3& vertex : NetThrough(shape, level, on_template.grid, samples).vertices) {
+    model.rows.push_back(
+        {vertex, Eigen::Matrix3Xd(3, prior.model.Modes()), Eigen::RowVectorXd(field.cols())});
+  }
+  const auto net_of = [&](const auto& value) {
+    return NetOfModel(prior, on_template, shape, level, value);
+  };
+  AddModes(prior, net_of, model);
+  AddField(field, net_of, model);
+  return model;
+}
+
+LevelSummary SolveJointStep(const VertexModel& model, const JointData& data,
+                            const JointWeights& weights, const ScheduleStep& step,
+                            JointState& state) {
+  CheckModel(model, state.surface.shape());
+  const double rms_before_mm = ObservedRms_mm(data, state.surface);
+  JointStep joint(model, data, weights, state);
+  LevelSummary summary = joint.Solve();
+  summary.fraction = step.fraction;
+  summary.rms_before_mm = rms_before_mm;
+  if (summary.usable) {
+    MoveTowards(joint.Net(), step.fraction, state.surface, summary);
+    state.parameters = PartOfWay(state.parameters, joint.parameters(), step.fraction);
+  }
+  summary.rms_after_mm = ObservedRms_mm(data, state.surface);
+  return summary;
+}
+
+}  // namespace semblance::problems

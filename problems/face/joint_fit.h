@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One step of a fit in which the control vertices of a level, the coefficients of a face model and
+// the pose are unknowns of one ceres::Problem. The face model is not a face computed beforehand:
+// what dowels and implicit face do to the surface moves the model too.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <string>
+#include <vector>
+
+#include "fitting/problem/fit_schedule.h"
+#include "fitting/solve/level_summary.h"
+#include "problems/face/hspline_prior.h"
+#include "problems/face/residual_field.h"
+#include "problems/face/shape_model/shape_posterior.h"
+#include "surfaces/hspline/hspline_surface.h"
+
+namespace semblance::problems {
+
+// The control vertices of one level as points of a shape model. A B-spline commutes with affine
+// maps, so the vertices of the model's surface are placed like its points:
+//   model_i(pose, w, a) = s R (mean_i + modes_i w + field_i a - centre) + t.
+struct VertexModel {
+  int level = -1;
+  std::vector<ShapeRow> rows;  // one per vertex of the level
+};
+
+// The least-squares nets of the mean, of each mode and of each column of the field. field: one row
+// per point of the model (SmoothFieldFactor). Throws InputError for a surface that is not open.
+VertexModel MakeVertexModel(const FacePrior& prior, const PriorOnTemplate& on_template,
+                            const Eigen::MatrixXd& field, const HSplineShape& shape, int level);
+
+// An observation of the surface S at (u,v). Its cost is
+// weight * Huber_width(|whitening (S(u,v) - position)|^2), as that of a ShapeObservation.
+struct SurfaceObservation {
+  Vec2 uv = Vec2::Constant(kNaN);
+  Vec3 position = Vec3::Constant(kNaN);  // mm
+  Eigen::Matrix<double, Eigen::Dynamic, 3> whitening;
+  double loss_width = kNaN;
+  double weight = 1;
+};
+
+struct JointData {
+  std::vector<SurfaceObservation> dowels;
+  std::vector<SurfaceObservation> seeds;
+  std::vector<ShapeObservation> marks;  // of the model's points; for rules
+};
+
+struct JointWeights {
+  ResidualFieldOptions residual;
+  ShapePrior prior;
+  std::array<double, 7> start_pose = {};  // mean of the pose's prior
+};
+
+// What is known of the face between two steps.
+struct JointState {
+  HSplineSurface surface;
+  ShapeFrame frame;
+  ShapeParameters parameters;
+};
+
+// Solves one step and moves the vertices and the parameters by the step's fraction of the way to
+// the solution. The solution makes least, over the deviations r_i = c_i - model_i(pose, w, a) of
+// the level's vertices c_i from the model, the pose, and the coefficients w and a,
+//   dowels + seeds + marks + sum over rows of MakeFieldRows |row r|^2
+//     + |w / mode_sd|^2 + |a|^2 + the prior of the pose.
+// The unknowns r_i instead of c_i change nothing but the speed: no row then couples a vertex with
+// all coefficients, except at the observations. S is the surface with the present detail of finer
+// levels. `terms` of the summary are dowels, seeds, marks, residual_field and face_model, the rows
+// and observations without those that are empty; their values are the costs above. One thread; the
+// same input gives the same bytes. Throws InputError for a level that the surface does not have and
+// for a model with another number of vertices.
+LevelSummary SolveJointStep(const VertexModel& model, const JointData& data,
+                            const JointWeights& weights, const ScheduleStep& step,
+                            JointState& state);
+
+}  // namespace semblance::problems
