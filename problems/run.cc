@@ -67,6 +67,52 @@ void NoteFace(const Experiment& experiment, const LoadedPrior* prior, Case& subj
       std::back_inserter(subject.notes));
 }
 
+// The distance across the face from a site of the prior's face to the end of its dowel. NaN for
+// other sites.
+double DistanceAcross_mm(const FacePrior& prior, const ShapeEstimate& estimate,
+                         const std::vector<Dowel>& dowels, std::size_t tip) {
+  const std::string& label = estimate.tip_labels[tip];
+  const auto site = prior.sites.find(label);
+  const auto dowel = std::ranges::find(dowels, label, &Dowel::site);
+  if (site == prior.sites.end() || dowel == dowels.end()) {
+    return kNaN;
+  }
+  const Vec3 at = FindPosition(site->second, prior.model.mean, estimate.points);
+  const double along_mm = estimate.tip_residual_mm[tip];
+  return std::sqrt(std::max(0.0, (dowel->Tip() - at).squaredNorm() - along_mm * along_mm));
+}
+
+// A dowel that contradicts the face model, the other dowels and the bone. It counts less, so the
+// face does not follow it, and its landmark or its depth is probably wrong. A phantom's sites are
+// not where people have them.
+void NoteDisagreeingDowels(const MadeFace& made, const LoadedPrior* prior, bool is_person,
+                           Case& subject) {
+  // Below this weight the tip lies more than five standard deviations off. On three measured heads
+  // no dowel's weight is below 1.
+  constexpr double kLeastWeight = 0.6;
+  constexpr double kFarAlong_mm = 2;  // four deviations of a measured tip
+  if (!made.prior || prior == nullptr) {
+    return;
+  }
+  const ShapeEstimate& estimate = *made.prior;
+  for (std::size_t k = 0; k < estimate.tip_labels.size(); ++k) {
+    const double along_mm = estimate.tip_residual_mm[k], weight = estimate.tip_weight[k];
+    const bool is_far = std::abs(along_mm) > kFarAlong_mm;
+    if (weight >= kLeastWeight || (!is_far && !is_person)) {
+      continue;
+    }
+    const std::string where =
+        is_far ? fmt::format("the face lies {:.1f} mm {} its end", std::abs(along_mm),
+                             along_mm > 0 ? "below" : "above")
+               : fmt::format("its end lies {:.0f} mm beside its place on the face",
+                             DistanceAcross_mm(prior->face, estimate, subject.dowels_on_bone, k));
+    subject.notes.push_back(
+        fmt::format("the depth marker at {} disagrees with the others: {}, and it counts {:.0f} %; "
+                    "check its landmark and its depth",
+                    estimate.tip_labels[k], where, 100 * weight));
+  }
+}
+
 // ---------------------------------------------------------------------------------------------
 // Measuring
 // ---------------------------------------------------------------------------------------------
@@ -124,6 +170,8 @@ class FaceJob {
   void EstimateUncertainty();
   void MeasureFace();
   void NoteSmallTruth();
+  // A phantom is not one.
+  bool IsPerson() const { return !std::holds_alternative<PhantomOptions>(experiment_.subject); }
   void Judge();
   void PutFaceOnBust();
   RunResult TakeResult();
@@ -203,6 +251,7 @@ void FaceJob::MakeSubjectsFace() {
                     context_);
   });
   NoteFace(experiment_, prior_.get(), subject_);
+  NoteDisagreeingDowels(*made_, prior_.get(), IsPerson(), subject_);
 }
 
 void FaceJob::ReplayEdits() {
@@ -274,7 +323,7 @@ void FaceJob::Judge() {
                       .pose = subject_.basis.sites,
                       .target = made_->fitted.target,
                       .fit = made_->fitted.fit,
-                      .is_person = !std::holds_alternative<PhantomOptions>(experiment_.subject)},
+                      .is_person = IsPerson()},
                      experiment_.plausibility, context_);
   });
 }

@@ -85,7 +85,7 @@ constexpr int kMinFiles = 2, kMaxFiles = 45;
 // Where a library may be included: a regular expression over the path of the including file.
 const std::map<std::string, std::string> kLibraryPlaces = {
     {"ceres/",
-     R"(fitting/(\w+/)?\w+(\.cc|_cost\.h)|interp/kriging/bounded_minimum\.cc|problems/face/shape_model/\w+(\.cc|_cost\.h))"},
+     R"(fitting/(\w+/)?\w+(\.cc|_cost\.h)|interp/kriging/bounded_minimum\.cc|problems/face/(shape_model/\w+|joint_fit)(\.cc|_cost\.h))"},
     {"yaml-cpp/", R"(problems/config/config\.cc)"},
     {"CGAL/", R"([\w/]+\.cc)"},
     {"OpenMesh/", R"(surfaces/\w+/\w+\.cc|surfaces/mesh/half_edge_mesh\.h)"},

@@ -145,7 +145,8 @@ def scatter(names, depths, table):
     own = [k for k, name in enumerate(names) if name.split("_")[0] in means]
     logs = np.log(depths[:, own] / np.array([means[names[k].split("_")[0]] for k in own]))
     logs = logs[(~np.isnan(logs)).sum(axis=1) >= 10]
-    factors = np.exp(np.sqrt(np.nanmean((logs - np.nanmedian(logs, axis=1, keepdims=True)) ** 2, axis=1)))
+    off = np.minimum(np.abs(logs - np.nanmedian(logs, axis=1, keepdims=True)), 1.3)  # one wrong depth counts as 3.7 times
+    factors = np.exp(np.sqrt(np.nanmean(off**2, axis=1)))
     print(f"{len(factors)} heads: {factors.min():.2f}, median {np.median(factors):.2f}, {factors.max():.2f}")
 
 

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <string>
@@ -110,7 +111,10 @@ class JointFitter {
         context_(context),
         target_(std::move(likely.target)),
         made_(std::move(likely.made)),
-        state_{made_.placed.face.surface, made_.prior->frame, made_.prior->parameters},
+        surface_(made_.placed.face.surface),
+        model_(MakeVertexModel(in.prior->face, in.prior->on_template, made_.prior->field,
+                               surface_.shape())),
+        state_(StartJoint(surface_.shape(), made_.prior->frame, made_.prior->parameters)),
         features_(FeaturesOn(*made_.prior, in.prior->face)) {
     const ShapeFitOptions& estimate = options.use.estimate;
     weights_ = {.residual = options.residual,
@@ -146,7 +150,7 @@ class JointFitter {
       if (const auto site = own.find(point.label); !dowel.is_held && site != own.end()) {
         dowel.point.uv = site->second;
       } else if (!dowel.is_held) {
-        dowel.point.uv = ProjectFrom(state_.surface, point.position, point.uv).uv;
+        dowel.point.uv = ProjectFrom(surface_, point.position, point.uv).uv;
       }
       const auto tip = std::ranges::find(target_.tips, point.label, &ShapeTip::label);
       if (tip != target_.tips.end()) {
@@ -160,13 +164,20 @@ class JointFitter {
 
   void Seed() {
     data_.seeds.clear();
-    seeding_ = implicit_ ? MakeSeeds(state_.surface, implicit_->query(), in_,
+    seeding_ = implicit_ ? MakeSeeds(surface_, implicit_->query(), in_,
                                      TemplateMasks(made_.placed.face), in_.experiment.seeds)
                          : SeedResult{.points = {}, .masked = 0, .missed = 0, .folded = 0};
     std::erase_if(seeding_.points, [&](const FitPoint& seed) { return !IsTrusted(seed.position); });
-    for (FitPoint& seed : seeding_.points) {
-      const auto count = static_cast<double>(seeding_.points.size());
-      seed.weight = options_.use.estimate.surface_worth / count;
+    // A seed stands for the area of its patch: patches round the mouth are small.
+    std::vector<double> areas;
+    for (const FitPoint& seed : seeding_.points) {
+      const SurfaceFrame frame = surface_.Frame(seed.uv);
+      areas.push_back(frame.du.cross(frame.dv).norm());
+    }
+    const double all = std::accumulate(areas.begin(), areas.end(), 0.0);
+    for (std::size_t k = 0; k < areas.size(); ++k) {
+      FitPoint& seed = seeding_.points[k];
+      seed.weight = options_.use.estimate.surface_worth * areas[k] / all;
       data_.seeds.push_back(implicit_->Observe(seed, options_.use.estimate, seed.weight));
     }
   }
@@ -190,7 +201,8 @@ class JointFitter {
     for (const SlidingDowel& dowel : dowels_) {
       ObserveDowel(dowel);
     }
-    levels_.push_back(SolveJointStep(ModelOf(step.level), data_, weights_, step, state_));
+    levels_.push_back(SolveJointStep(model_, data_, weights_, step, state_));
+    Assemble();
   }
 
   void SlideDowels() {
@@ -199,9 +211,9 @@ class JointFitter {
       if (dowel.is_held) {
         continue;
       }
-      const Vec2 foot = ProjectFrom(state_.surface, dowel.point.position, dowel.foot_uv).uv;
-      farthest_mm = std::max(
-          farthest_mm, (state_.surface.Point(foot) - state_.surface.Point(dowel.foot_uv)).norm());
+      const Vec2 foot = ProjectFrom(surface_, dowel.point.position, dowel.foot_uv).uv;
+      farthest_mm =
+          std::max(farthest_mm, (surface_.Point(foot) - surface_.Point(dowel.foot_uv)).norm());
       dowel.foot_uv = foot;
     }
     slides_.push_back({.before = {}, .after = {}, .max_move_mm = farthest_mm});
@@ -210,7 +222,7 @@ class JointFitter {
   // Tight along the normal at the foot, loose across it at the site.
   void ObserveDowel(const SlidingDowel& dowel) {
     const ShapeFitOptions& estimate = options_.use.estimate;
-    const Vec3 normal = state_.surface.Frame(dowel.foot_uv).Normal();
+    const Vec3 normal = surface_.Frame(dowel.foot_uv).Normal();
     const double normal_sd_mm =
         std::hypot(estimate.tip_normal_sd_mm, dowel.along_sd_mm * normal.dot(dowel.direction));
     const Vec3 across = normal.unitOrthogonal();
@@ -227,19 +239,25 @@ class JointFitter {
     data_.dowels.push_back(seen);
   }
 
-  const VertexModel& ModelOf(int level) {
-    const auto found = models_.find(level);
-    return found != models_.end()
-               ? found->second
-               : models_
-                     .emplace(level,
-                              MakeVertexModel(in_.prior->face, in_.prior->on_template,
-                                              made_.prior->field, state_.surface.shape(), level))
-                     .first->second;
+  // The face as one H-spline: at every level the model's net and the deviation from it.
+  void Assemble() {
+    MoveModel();
+    surface_ =
+        MakeFaceSurface(*made_.prior, in_.prior->face, in_.prior->on_template, surface_.shape());
+    std::vector<ControlNet> nets;
+    for (int level = 0; level <= surface_.shape().max_level; ++level) {
+      ControlNet& net = nets.emplace_back(surface_.Net(level));
+      for (std::size_t k = 0; k < net.vertices.size(); ++k) {
+        net.vertices[k] += state_.residual[level].vertices[k];
+      }
+    }
+    for (std::size_t level = 0; level < nets.size(); ++level) {
+      surface_.SetNet(static_cast<int>(level), nets[level]);
+    }
   }
 
   MadeFace Result() {
-    FitResult fit{.surface = state_.surface, .levels = levels_, .relaxations = slides_};
+    FitResult fit{.surface = surface_, .levels = levels_, .relaxations = slides_};
     fit.restored_features = 0;
     fit.usable = std::ranges::all_of(levels_, &LevelSummary::usable);
     FitTarget points;
@@ -253,7 +271,6 @@ class JointFitter {
     }
     made_.fitted = {std::move(seeding_), std::move(points), std::move(fit)};
     MeasureResiduals(made_.fitted);
-    MoveModel();
     return std::move(made_);
   }
 
@@ -278,6 +295,8 @@ class JointFitter {
   const RunContext& context_;
   ShapeTarget target_;
   MadeFace made_;
+  HSplineSurface surface_;
+  VertexModel model_;
   JointState state_;
   std::vector<Sphere> features_;
   JointWeights weights_;
@@ -285,7 +304,6 @@ class JointFitter {
   std::vector<SlidingDowel> dowels_;
   std::optional<ImplicitObserver> implicit_;
   SeedResult seeding_;
-  std::map<int, VertexModel> models_;  // by level
   std::vector<LevelSummary> levels_;
   std::vector<RelaxationSummary> slides_;
 };

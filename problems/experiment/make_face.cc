@@ -298,6 +298,15 @@ FitPlan PlanFitOnPrior(const PriorThenFit& o, const FaceInput& in) {
   return plan;
 }
 
+// The factor by which the estimate's loss reduced the pull of a dowel; 1 for one that took no part.
+// Without it a single wrong dowel, which the estimate resists, would spoil the fit.
+double TipWeight(const ShapeEstimate& estimate, const std::string& label) {
+  const auto found = std::ranges::find(estimate.tip_labels, label);
+  return found == estimate.tip_labels.end()
+             ? 1
+             : estimate.tip_weight[found - estimate.tip_labels.begin()];
+}
+
 MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext& context) {
   MadeFace made = FindLikelyFace(o.use, std::move(placed), in, context).made;
@@ -306,6 +315,7 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
     if (!IsHeld(in.experiment.sites, point.label)) {
       point.uv = ProjectFrom(surface, point.position, point.uv).uv;
     }
+    point.weight *= TipWeight(*made.prior, point.label);
   }
   const PriorKnowledge known{
       .shape = SampleShape(surface, *made.prior, in.prior->face, in.prior->on_template),

@@ -20,25 +20,11 @@ namespace {
 
 using BlockRows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
-// The model's row of a point of the level's B-spline: a weighted sum of its vertices' rows.
-ShapeRow RowAt(const VertexModel& model, const Stencil& stencil) {
-  const ShapeRow& first = model.rows[stencil.index[0]];
-  ShapeRow sum{Vec3::Zero(), Eigen::Matrix3Xd::Zero(3, first.modes.cols()),
-               Eigen::RowVectorXd::Zero(first.field.size())};
-  for (int k = 0; k < 16; ++k) {
-    const ShapeRow& row = model.rows[stencil.index[k]];
-    sum.mean += stencil.weight[k] * row.mean;
-    sum.modes += stencil.weight[k] * row.modes;
-    sum.field += stencil.weight[k] * row.field;
-  }
-  return sum;
-}
-
 // Residual whitening (sum_k weight_k r_k + model(pose, w, a) + detail - position). Blocks: those of
 // the model's parameters (ShapeBlocks), then the deviations r_k of sixteen vertices.
 class SurfaceCost final : public ceres::CostFunction {
  public:
-  // detail: what finer levels add to the surface there. frame must outlive the cost.
+  // detail: what finer levels add to R there. frame must outlive the cost.
   SurfaceCost(const ShapeFrame& frame, ShapeRow row, const Stencil& stencil,
               const SurfaceObservation& seen, const Vec3& detail)
       : frame_(frame),
@@ -125,31 +111,54 @@ class FieldCost final : public ceres::CostFunction {
   std::vector<double> weights_;
 };
 
-// The problem of one step. Its blocks are the deviations of the vertices and the parameters.
+// The points of the face at the Greville points of a level. The outermost vertices have theirs
+// beyond the domain; they are placed on the lines through the two next ones.
+ControlNet PlaceVertices(const VertexModel& model, int level, const JointState& state) {
+  ControlNet places = state.residual[level];
+  const int columns = places.columns, rows = places.rows;
+  for (int k = 0; k < columns * rows; ++k) {
+    const Vec2 uv = GrevillePoint(model.shape, {level, k % columns, k / columns});
+    places.vertices[k] = state.Point(model, uv);
+  }
+  const auto extend = [](Vec3& outer, const Vec3& next, const Vec3& inner) {
+    outer = 2 * next - inner;
+  };
+  for (int j = 0; j < rows; ++j) {
+    extend(places.At(0, j), places.At(1, j), places.At(2, j));
+    extend(places.At(columns - 1, j), places.At(columns - 2, j), places.At(columns - 3, j));
+  }
+  for (int i = 0; i < columns; ++i) {
+    extend(places.At(i, 0), places.At(i, 1), places.At(i, 2));
+    extend(places.At(i, rows - 1), places.At(i, rows - 2), places.At(i, rows - 3));
+  }
+  return places;
+}
+
+// The problem of one step. Its blocks are the vertices of R's level and the parameters.
 class JointStep {
  public:
-  JointStep(const VertexModel& model, const JointData& data, const JointWeights& weights,
+  JointStep(const VertexModel& model, const JointData& data, const JointWeights& weights, int level,
             const JointState& state)
       : model_(model),
-        surface_(state.surface),
+        finest_(state.residual.back()),
+        level_(level),
         frame_(state.frame),
-        net_(state.surface.Net(model.level)),
+        start_(state.residual[level]),
+        net_(start_),
         parameters_(state.parameters) {
-    for (std::size_t i = 0; i < net_.vertices.size(); ++i) {
-      deviations_.push_back(net_.vertices[i] - PlacedPoint(frame_, model.rows[i], parameters_));
-    }
     Add("dowels", [&] { AddObservations(data.dowels); });
     Add("seeds", [&] { AddObservations(data.seeds); });
     Add("marks", [&] { AddMarks(data.marks); });
-    Add("residual_field", [&] { AddResidualField(weights.residual); });
+    Add("residual_field",
+        [&] { AddResidualField(MakeFieldRows(PlaceVertices(model, level, state), weights.residual)); });
     Add("face_model",
         [&] { AddShapePriors(weights.prior, weights.start_pose, parameters_, problem_); });
   }
 
   LevelSummary Solve() {
     LevelSummary summary;
-    summary.level = model_.level;
-    summary.free_vertices = static_cast<int>(deviations_.size());
+    summary.level = level_;
+    summary.free_vertices = static_cast<int>(net_.vertices.size());
     summary.solver = "ceres";
     for (const Part& part : parts_) {
       summary.terms.push_back({.term = part.name, .before = Cost(part), .after = kNaN});
@@ -164,15 +173,8 @@ class JointStep {
     return summary;
   }
 
-  // The vertices at the solution.
-  ControlNet Net() const {
-    ControlNet net = net_;
-    for (std::size_t i = 0; i < net.vertices.size(); ++i) {
-      net.vertices[i] = PlacedPoint(frame_, model_.rows[i], parameters_) + deviations_[i];
-    }
-    return net;
-  }
-
+  // At the solution.
+  const ControlNet& net() const { return net_; }
   const ShapeParameters& parameters() const { return parameters_; }
 
  private:
@@ -195,14 +197,14 @@ class JointStep {
 
   void AddObservations(const std::vector<SurfaceObservation>& seen) {
     for (const SurfaceObservation& one : seen) {
-      const Stencil stencil = StencilAt(surface_.shape(), model_.level, one.uv);
-      const Vec3 detail = surface_.Point(one.uv) - stencil.Apply(net_);
+      const Stencil stencil = StencilAt(model_.shape, level_, one.uv);
+      const Vec3 all = StencilAt(model_.shape, model_.shape.max_level, one.uv).Apply(finest_);
       std::vector<double*> blocks = ShapeBlocks(parameters_);
       for (const int vertex : stencil.index) {
-        blocks.push_back(deviations_[vertex].data());
+        blocks.push_back(net_.vertices[vertex].data());
       }
       problem_.AddResidualBlock(
-          new SurfaceCost(frame_, RowAt(model_, stencil), stencil, one, detail),
+          new SurfaceCost(frame_, model_.RowAt(one.uv), stencil, one, all - stencil.Apply(start_)),
           MakeLoss(one.loss_width, one.weight), blocks);
     }
   }
@@ -214,11 +216,11 @@ class JointStep {
     }
   }
 
-  void AddResidualField(const ResidualFieldOptions& options) {
-    for (FieldRow& row : MakeFieldRows(net_, options)) {
+  void AddResidualField(std::vector<FieldRow> rows) {
+    for (FieldRow& row : rows) {
       std::vector<double*> blocks;
       for (const int vertex : row.index) {
-        blocks.push_back(deviations_[vertex].data());
+        blocks.push_back(net_.vertices[vertex].data());
       }
       problem_.AddResidualBlock(new FieldCost(std::move(row.weight)), nullptr, blocks);
     }
@@ -233,9 +235,9 @@ class JointStep {
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
     options.num_threads = 1;
     options.max_num_iterations = 50;
-    // Rotation and losses are not linear, so steps converge linearly; 1e-9 of the cost is far below
-    // a micrometre.
-    options.function_tolerance = 1e-9;
+    // Rotation and losses are not linear, so steps converge linearly. A smaller tolerance takes
+    // twice as many iterations and moves no vertex by 0.01 mm, and the next step starts again.
+    options.function_tolerance = 1e-7;
     options.logging_type = ceres::SILENT;
     ceres::Solver::Summary summary;
     ceres::Solve(options, &problem_, &summary);
@@ -252,11 +254,12 @@ class JointStep {
   }
 
   const VertexModel& model_;
-  const HSplineSurface& surface_;
+  const ControlNet& finest_;  // R at the start
+  int level_;
   const ShapeFrame frame_;
-  const ControlNet net_;  // at the start
+  const ControlNet start_;  // of the level
+  ControlNet net_;
   ShapeParameters parameters_;
-  std::vector<Vec3> deviations_;
   ceres::Problem problem_;
   std::vector<Part> parts_;
 };
@@ -272,44 +275,41 @@ ShapeParameters PartOfWay(const ShapeParameters& from, const ShapeParameters& to
   return part;
 }
 
-void MoveTowards(const ControlNet& solved, double fraction, HSplineSurface& surface,
-                 LevelSummary& summary) {
-  ControlNet net = surface.Net(summary.level);
+// Moves the level's vertices by the fraction of the way, and the finer nets along.
+void MoveTowards(const HSplineShape& shape, const ControlNet& solved, LevelSummary& summary,
+                 JointState& state) {
+  ControlNet move = solved;
   summary.max_move_mm = 0;
   summary.moved_vertices = 0;
-  for (std::size_t k = 0; k < net.vertices.size(); ++k) {
-    const Vec3 move = fraction * (solved.vertices[k] - net.vertices[k]);
-    net.vertices[k] += move;
-    summary.max_move_mm = std::max(summary.max_move_mm, move.norm());
-    summary.moved_vertices += move.norm() >= kLeastMove_mm ? 1 : 0;
+  for (std::size_t k = 0; k < move.vertices.size(); ++k) {
+    Vec3& by = move.vertices[k];
+    by = summary.fraction * (by - state.residual[summary.level].vertices[k]);
+    summary.max_move_mm = std::max(summary.max_move_mm, by.norm());
+    summary.moved_vertices += by.norm() >= kLeastMove_mm ? 1 : 0;
   }
-  surface.SetNet(summary.level, net);
+  for (int level = summary.level; level <= shape.max_level; ++level) {
+    for (std::size_t k = 0; k < move.vertices.size(); ++k) {
+      state.residual[level].vertices[k] += move.vertices[k];
+    }
+    move = level < shape.max_level ? Refine(shape, move, level) : move;
+  }
 }
 
 // The weighted root mean square distance of the surface from dowels and seeds.
-double ObservedRms_mm(const JointData& data, const HSplineSurface& surface) {
+double ObservedRms_mm(const VertexModel& model, const JointData& data, const JointState& state) {
   double sum = 0, weights = 0;
   for (const auto* const list : {&data.dowels, &data.seeds}) {
     for (const SurfaceObservation& one : *list) {
-      sum += one.weight * (surface.Point(one.uv) - one.position).squaredNorm();
+      sum += one.weight * (state.Point(model, one.uv) - one.position).squaredNorm();
       weights += one.weight;
     }
   }
   return std::sqrt(sum / weights);
 }
 
-void CheckModel(const VertexModel& model, const HSplineShape& shape) {
-  if (model.level < 0 || model.level > shape.max_level ||
-      std::ssize(model.rows) != shape.Columns(model.level) * shape.Rows(model.level)) {
-    throw InputError(fmt::format(
-        "joint fit: {} vertices of level {}; give the model of a level that the surface has",
-        model.rows.size(), model.level));
-  }
-}
-
 // The net of one vector per sample of the template's grid, which is that of a point of the model.
 ControlNet NetOfModel(const FacePrior& prior, const PriorOnTemplate& on_template,
-                      const HSplineShape& shape, int level, const auto& value_at_vertex) {
+                      const HSplineShape& shape, const auto& value_at_vertex) {
   std::vector<Vec3> samples;
   samples.reserve(on_template.under.size());
   for (const ModelPoint& under : on_template.under) {
@@ -318,7 +318,7 @@ ControlNet NetOfModel(const FacePrior& prior, const PriorOnTemplate& on_template
                          under.weights[1] * value_at_vertex(t[1]) +
                          under.weights[2] * value_at_vertex(t[2]));
   }
-  return NetThrough(shape, level, on_template.grid, samples);
+  return NetThrough(shape, shape.max_level, on_template.grid, samples);
 }
 
 void AddModes(const FacePrior& prior, const auto& net_of, VertexModel& model) {
@@ -348,41 +348,75 @@ void AddField(const Eigen::MatrixXd& field, const auto& net_of, VertexModel& mod
 
 }  // namespace
 
+ShapeRow VertexModel::RowAt(const Vec2& uv) const {
+  const Stencil stencil = StencilAt(shape, shape.max_level, uv);
+  const ShapeRow& first = rows[stencil.index[0]];
+  ShapeRow sum{Vec3::Zero(), Eigen::Matrix3Xd::Zero(3, first.modes.cols()),
+               Eigen::RowVectorXd::Zero(first.field.size())};
+  for (int k = 0; k < 16; ++k) {
+    const ShapeRow& row = rows[stencil.index[k]];
+    sum.mean += stencil.weight[k] * row.mean;
+    sum.modes += stencil.weight[k] * row.modes;
+    sum.field += stencil.weight[k] * row.field;
+  }
+  return sum;
+}
+
 VertexModel MakeVertexModel(const FacePrior& prior, const PriorOnTemplate& on_template,
-                            const Eigen::MatrixXd& field, const HSplineShape& shape, int level) {
+                            const Eigen::MatrixXd& field, const HSplineShape& shape) {
   std::vector<Vec3> samples;
   for (std::size_t k = 0; k < on_template.under.size(); ++k) {
     samples.emplace_back(
         FindPosition(on_template.under[k], prior.model.mean, prior.model.mean.points) +
         on_template.beside[k]);
   }
-  VertexModel model{.level = level, .rows = {}};
-  for (const Vec3& vertex : NetThrough(shape, level, on_template.grid, samples).vertices) {
+  VertexModel model{.shape = shape, .rows = {}};
+  for (const Vec3& vertex :
+       NetThrough(shape, shape.max_level, on_template.grid, samples).vertices) {
     model.rows.push_back(
         {vertex, Eigen::Matrix3Xd(3, prior.model.Modes()), Eigen::RowVectorXd(field.cols())});
   }
   const auto net_of = [&](const auto& value) {
-    return NetOfModel(prior, on_template, shape, level, value);
+    return NetOfModel(prior, on_template, shape, value);
   };
   AddModes(prior, net_of, model);
   AddField(field, net_of, model);
   return model;
 }
 
+Vec3 JointState::Point(const VertexModel& model, const Vec2& uv) const {
+  return PlacedPoint(frame, model.RowAt(uv), parameters) +
+         StencilAt(model.shape, model.shape.max_level, uv).Apply(residual.back());
+}
+
+JointState StartJoint(const HSplineShape& shape, const ShapeFrame& frame,
+                      const ShapeParameters& parameters) {
+  JointState state{.residual = {}, .frame = frame, .parameters = parameters};
+  for (int level = 0; level <= shape.max_level; ++level) {
+    const int columns = shape.Columns(level), rows = shape.Rows(level);
+    state.residual.push_back(
+        {columns, rows, std::vector<Vec3>(static_cast<std::size_t>(columns) * rows, Vec3::Zero())});
+  }
+  return state;
+}
+
 LevelSummary SolveJointStep(const VertexModel& model, const JointData& data,
                             const JointWeights& weights, const ScheduleStep& step,
                             JointState& state) {
-  CheckModel(model, state.surface.shape());
-  const double rms_before_mm = ObservedRms_mm(data, state.surface);
-  JointStep joint(model, data, weights, state);
+  if (step.level < 0 || step.level > model.shape.max_level) {
+    throw InputError(fmt::format("joint fit: the face has no level {}; its levels are 0 to {}",
+                                 step.level, model.shape.max_level));
+  }
+  const double rms_before_mm = ObservedRms_mm(model, data, state);
+  JointStep joint(model, data, weights, step.level, state);
   LevelSummary summary = joint.Solve();
   summary.fraction = step.fraction;
   summary.rms_before_mm = rms_before_mm;
   if (summary.usable) {
-    MoveTowards(joint.Net(), step.fraction, state.surface, summary);
+    MoveTowards(model.shape, joint.net(), summary, state);
     state.parameters = PartOfWay(state.parameters, joint.parameters(), step.fraction);
   }
-  summary.rms_after_mm = ObservedRms_mm(data, state.surface);
+  summary.rms_after_mm = ObservedRms_mm(model, data, state);
   return summary;
 }
 

@@ -14,22 +14,26 @@
 #include "problems/face/hspline_prior.h"
 #include "problems/face/residual_field.h"
 #include "problems/face/shape_model/shape_posterior.h"
-#include "surfaces/hspline/hspline_surface.h"
+#include "surfaces/hspline/bspline.h"
+#include "surfaces/hspline/hspline_shape.h"
 
 namespace semblance::problems {
 
-// The control vertices of one level as points of a shape model. A B-spline commutes with affine
-// maps, so the vertices of the model's surface are placed like its points:
+// The control vertices of the finest level as points of a shape model. A B-spline commutes with
+// affine maps, so the vertices of the model's surface are placed like its points:
 //   model_i(pose, w, a) = s R (mean_i + modes_i w + field_i a - centre) + t.
 struct VertexModel {
-  int level = -1;
-  std::vector<ShapeRow> rows;  // one per vertex of the level
+  HSplineShape shape;
+  std::vector<ShapeRow> rows;  // one per vertex of shape.max_level
+
+  // The row of the surface's point at (u,v): a weighted sum of sixteen vertices' rows.
+  ShapeRow RowAt(const Vec2& uv) const;
 };
 
 // The least-squares nets of the mean, of each mode and of each column of the field. field: one row
 // per point of the model (SmoothFieldFactor). Throws InputError for a surface that is not open.
 VertexModel MakeVertexModel(const FacePrior& prior, const PriorOnTemplate& on_template,
-                            const Eigen::MatrixXd& field, const HSplineShape& shape, int level);
+                            const Eigen::MatrixXd& field, const HSplineShape& shape);
 
 // An observation of the surface S at (u,v). Its cost is
 // weight * Huber_width(|whitening (S(u,v) - position)|^2), as that of a ShapeObservation.
@@ -53,24 +57,32 @@ struct JointWeights {
   std::array<double, 7> start_pose = {};  // mean of the pose's prior
 };
 
-// What is known of the face between two steps.
+// The face between two steps: S(u,v) = model(u,v; pose, w, a) + R(u,v). R is the deviation from the
+// model, a hierarchical B-spline of its own. residual[l] is its net with the detail of levels 0..l;
+// the last one is R.
 struct JointState {
-  HSplineSurface surface;
+  std::vector<ControlNet> residual;  // per level 0..max_level, mm
   ShapeFrame frame;
   ShapeParameters parameters;
+
+  Vec3 Point(const VertexModel& model, const Vec2& uv) const;
 };
 
-// Solves one step and moves the vertices and the parameters by the step's fraction of the way to
-// the solution. The solution makes least, over the deviations r_i = c_i - model_i(pose, w, a) of
-// the level's vertices c_i from the model, the pose, and the coefficients w and a,
+// The model's own face: no deviation.
+JointState StartJoint(const HSplineShape& shape, const ShapeFrame& frame,
+                      const ShapeParameters& parameters);
+
+// Solves one step and moves the vertices of its level and the parameters by its fraction of the way
+// to the solution. The solution makes least, over the vertices r_i of residual[level], the pose,
+// and the coefficients w and a,
 //   dowels + seeds + marks + sum over rows of MakeFieldRows |row r|^2
 //     + |w / mode_sd|^2 + |a|^2 + the prior of the pose.
-// The unknowns r_i instead of c_i change nothing but the speed: no row then couples a vertex with
-// all coefficients, except at the observations. S is the surface with the present detail of finer
-// levels. `terms` of the summary are dowels, seeds, marks, residual_field and face_model, the rows
-// and observations without those that are empty; their values are the costs above. One thread; the
-// same input gives the same bytes. Throws InputError for a level that the surface does not have and
-// for a model with another number of vertices.
+// The face's control vertices are model_i + r_i. To solve for r_i instead of them changes nothing
+// but the speed: no row then couples a vertex with all coefficients, except at the data. Finer
+// levels of R keep their detail, which moves along. `terms` of the summary are dowels, seeds,
+// marks, residual_field and face_model, without those that have no data; their values are the costs
+// above. Its moves are those of R. One thread; the same input gives the same bytes. Throws
+// InputError for a level that the model does not have.
 LevelSummary SolveJointStep(const VertexModel& model, const JointData& data,
                             const JointWeights& weights, const ScheduleStep& step,
                             JointState& state);

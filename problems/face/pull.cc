@@ -155,7 +155,8 @@ Vec3 BrushMove(const Brush& brush, const HSplineSurface& face, const ControlNet&
       return face.Normal(GrevillePoint(face.shape(), {brush.level, i, j}));
     case BrushKind::kFlatten: {
       const Vec3 normal = face.Normal(uv);
-      return -(vertex - face.Point(uv)).dot(normal) * normal;
+      const Vec3 under = face.Point(GrevillePoint(face.shape(), {brush.level, i, j}));
+      return -(under - face.Point(uv)).dot(normal) * normal;
     }
   }
   return Vec3::Zero();

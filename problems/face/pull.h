@@ -37,7 +37,8 @@ constexpr auto EnumNames(BrushKind) {
 // share * strength, where share is (1 - (distance / reach)^2)^2:
 //   smooth:  towards the mean of its neighbours; strength 0..1
 //   inflate: along the surface's normal beside it; strength in mm, negative: inwards
-//   flatten: towards the tangent plane at the point; strength 0..1
+//   flatten: by the distance of the surface beside it from the tangent plane at the point, towards
+//            the plane; strength 0..1
 struct Brush {
   BrushKind kind = BrushKind::kSmooth;
   int level = 2;

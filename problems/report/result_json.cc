@@ -323,6 +323,10 @@ Json PriorJson(const ShapeEstimate& estimate) {
     }
     return std::sqrt(sum / static_cast<double>(std::size(values)));
   };
+  Json dowel_weights = Json::object();
+  for (std::size_t k = 0; k < estimate.tip_labels.size(); ++k) {
+    dowel_weights[estimate.tip_labels[k]] = estimate.tip_weight[k];
+  }
   return {{"coefficients",
            std::vector<double>(estimate.coefficients.begin(), estimate.coefficients.end())},
           {"coefficients_rms", rms(estimate.coefficients)},
@@ -331,6 +335,7 @@ Json PriorJson(const ShapeEstimate& estimate) {
           {"sigma_rms_mm", rms(estimate.sigma_mm)},
           {"dowels", estimate.tip_residual_mm.size()},
           {"dowel_rms_mm", rms(estimate.tip_residual_mm)},
+          {"dowel_weights", dowel_weights},
           {"surface_points", estimate.surface_points},
           {"rounds", estimate.rounds},
           {"last_move_mm", estimate.last_move_mm},

@@ -77,6 +77,7 @@ def experiment_space(schema, folder):
             ("face", "reference"): [("template", "file")],
             ("face", "prior"): [("template", "ict")],
             ("face", "prior_then_fit"): [("template", "ict")],
+            ("face", "joint"): [("template", "ict"), ("fit.plan", "listed")],
             ("bust", "ict"): [("template", "ict")],
             ("fit.terms#0", "prior_shape"): [("face", "prior_then_fit")],
             ("fit.terms#1", "prior_shape"): [("face", "prior_then_fit")],

@@ -140,6 +140,18 @@ TEST(Run, AReferenceNamesItsLandmarksAndItsSkin) {
                     HasSubstr("takes a reference head's own skin")));
 }
 
+TEST(Run, AScoreOverASmallPartOfTheFaceIsNoted) {
+  const std::string small = "region.exclude=[{site: n, radius_mm: 105}]";
+  const auto notes = [](const std::vector<std::string>& more) {
+    std::vector<std::string> overrides = {"face=placed"};
+    overrides.insert(overrides.end(), more.begin(), more.end());
+    return problems::Run(SmallPhantom(overrides), {}).subject.notes;
+  };
+  const auto note = ::testing::Contains(HasSubstr("says little about the face"));
+  EXPECT_THAT(notes({}), ::testing::Not(note));
+  EXPECT_THAT(notes({small}), note);
+}
+
 Experiment PhantomWithPrior(const std::vector<std::string>& more) {
   const std::string ict = (kConfigs / "faces/ict/").string();
   std::vector<std::string> overrides = {
@@ -428,6 +440,7 @@ void ExpectWhatARunLeaves(const std::map<std::string, std::string>& files) {
                                                 "pictures/error.png",
                                                 "pictures/error_implicit.png",
                                                 "pictures/face.png",
+                                                "pictures/fit.png",
                                                 "pictures/face_over_skull.png",
                                                 "pictures/implicit.png",
                                                 "pictures/overview.png",

@@ -15,7 +15,7 @@ export const showMessage = (words) => {
   box.hidden = !words;
 };
 
-// whole: show all anew, because another process numbers its changes from the beginning.
+// whole: show everything again, because another process counts its changes from the beginning.
 export const setState = (state, {whole = false} = {}) => {
   const former = whole ? null : store.state;
   store.state = state;

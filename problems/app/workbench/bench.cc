@@ -398,7 +398,7 @@ std::shared_ptr<const VolumeReading> Bench::ReadUnopened(const fs::path& path,
   return volume_.Read(path, options, Context());
 }
 
-std::vector<VolumeSeries> Bench::SeriesOf(const fs::path& path) const {
+std::vector<VolumeSeries> Bench::FindSeries(const fs::path& path) const {
   return ListSeries(path, Context());
 }
 

@@ -200,7 +200,8 @@ class Bench {
   // Reads a volume that is not opened yet, for a look at its slices.
   std::shared_ptr<const VolumeReading> ReadUnopened(const std::filesystem::path& path,
                                                     const ReadVolumeOptions& options);
-  std::vector<VolumeSeries> SeriesOf(const std::filesystem::path& path) const;
+  // The series of a DICOM folder; one for another volume.
+  std::vector<VolumeSeries> FindSeries(const std::filesystem::path& path) const;
 
   // Start background jobs. Each replaces a running job.
   void StartOpening(const OpenRequest& request);

@@ -482,7 +482,7 @@ BenchReply State(Bench& bench, const BenchRequest&) { return StateReply(bench); 
 
 BenchReply SeriesReply(Bench& bench, const BenchRequest& request) {
   Json json = Json::array();
-  for (const VolumeSeries& series : bench.SeriesOf(QueryText(request, "path"))) {
+  for (const VolumeSeries& series : bench.FindSeries(QueryText(request, "path"))) {
     json.push_back({{"name", series.name},
                     {"description", series.description},
                     {"modality", series.modality},

@@ -387,6 +387,7 @@ ShapeEstimate ShapeEstimator::Result(const RunContext& context) {
   for (std::size_t k = 0; k < target_.tips.size(); ++k) {  // the first observations are the tips
     const ShapeTip& tip = target_.tips[k];
     const Vec3 at = FindPosition(tip.at, model_.mean, placed_.points);
+    result.tip_labels.push_back(tip.label);
     result.tip_residual_mm.push_back(
         (tip.position - at).dot(NormalAt(tip.at, model_.mean, normals_)));
     result.tip_weight.push_back(LossWeight(seen_[k], at));

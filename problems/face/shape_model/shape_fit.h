@@ -205,6 +205,7 @@ struct ShapeEstimate {
   std::vector<Vec3> points;      // one per point of the model, in the subject's frame, mm
   // Standard deviation along the normal, one per point; empty if the target does not ask for it.
   std::vector<double> sigma_mm;
+  std::vector<std::string> tip_labels;  // of the tips that took part, in their order
   // Distance from the shape to each tip along the shape's normal, > 0 outside.
   std::vector<double> tip_residual_mm;
   // The factor in (0, 1] by which the loss reduced the pull of each tip in the last round. A small

@@ -262,6 +262,15 @@ TEST(Plausibility, ACorrectFacePassesAndEachCheckWasJudged) {
   }
 }
 
+// The phantoms' formula makes depths that no person has.
+TEST(Plausibility, APhantomsDepthsAreNotComparedWithThoseOfPeople) {
+  for (const char* name : {"depth_sds", "depth_factor", "depth_scatter"}) {
+    const PlausibilityCheck check = Find(GoodRun().plausibility, name);
+    EXPECT_TRUE(std::isnan(check.value)) << name;
+    EXPECT_THAT(check.sentence, HasSubstr("a phantom's depths are not those of people"));
+  }
+}
+
 TEST(Plausibility, AFaceThatWasNotJudgedIsNotUsable) {
   EXPECT_THAT(Plausibility().Faults(), ::testing::ElementsAre("the face was not judged"));
 }
