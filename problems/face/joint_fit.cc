@@ -149,8 +149,9 @@ class JointStep {
     Add("dowels", [&] { AddObservations(data.dowels); });
     Add("seeds", [&] { AddObservations(data.seeds); });
     Add("marks", [&] { AddMarks(data.marks); });
-    Add("residual_field",
-        [&] { AddResidualField(MakeFieldRows(PlaceVertices(model, level, state), weights.residual)); });
+    Add("residual_field", [&] {
+      AddResidualField(MakeFieldRows(PlaceVertices(model, level, state), weights.residual));
+    });
     Add("face_model",
         [&] { AddShapePriors(weights.prior, weights.start_pose, parameters_, problem_); });
   }
