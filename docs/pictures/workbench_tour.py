@@ -56,7 +56,7 @@ def press(browser, text):
 
 def let_the_program_suggest(browser):
     press(browser, "Suggest the other")
-    browser.wait("return window.semblance.store.state.landmarks.length > 20", seconds=300)
+    browser.wait("return window.semblance.store.state.landmarks.length > 12", seconds=300)
     browser.wait(IDLE, seconds=300)
     press(browser, "Review")
 
