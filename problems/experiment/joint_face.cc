@@ -124,6 +124,7 @@ class JointFitter {
                 .start_pose = state_.parameters.pose};
     data_.marks = ObserveMarks(target_, in.prior->face.model, made_.prior->field, estimate);
     PlaceDowels();
+    SlideDowels();
     if (!in.implicit.triangles.empty()) {
       implicit_.emplace(in.implicit, target_);
     }
@@ -134,6 +135,7 @@ class JointFitter {
       context_.Report("fit", fmt::format("round {} of {}", round + 1, in_.experiment.rounds));
       Seed();
       levels_.clear();
+      slides_.clear();
       for (const ScheduleStep& step : AllSteps(in_.experiment.fit.plan)) {
         Step(step);
       }
@@ -142,14 +144,18 @@ class JointFitter {
   }
 
  private:
-  // The (u,v) of a dowel's site on the model; elsewhere the point of the face nearest to the tip.
+  // The (u,v) that `sites` states, or else those of the site on the model; elsewhere the point of
+  // the face nearest to the tip.
   void PlaceDowels() {
     const std::map<std::string, Vec2>& own = made_.placed.face.site_uv;
+    const ExtraSites& stated = in_.experiment.sites;
     for (FitPoint& point : made_.placed.dowels.points) {
-      SlidingDowel dowel{.point = point, .is_held = IsHeld(in_.experiment.sites, point.label)};
-      if (const auto site = own.find(point.label); !dowel.is_held && site != own.end()) {
+      SlidingDowel dowel{.point = point, .is_held = IsHeld(stated, point.label)};
+      const auto given = stated.find(point.label);
+      const bool has_uv = given != stated.end() && given->second.uv.has_value();
+      if (const auto site = own.find(point.label); !has_uv && site != own.end()) {
         dowel.point.uv = site->second;
-      } else if (!dowel.is_held) {
+      } else if (!has_uv) {
         dowel.point.uv = ProjectFrom(surface_, point.position, point.uv).uv;
       }
       const auto tip = std::ranges::find(target_.tips, point.label, &ShapeTip::label);
@@ -196,15 +202,16 @@ class JointFitter {
 
   void Step(const ScheduleStep& step) {
     context_.ThrowIfStopped();
-    SlideDowels();
     data_.dowels.clear();
     for (const SlidingDowel& dowel : dowels_) {
       ObserveDowel(dowel);
     }
     levels_.push_back(SolveJointStep(model_, data_, weights_, step, state_));
     Assemble();
+    SlideDowels();
   }
 
+  // Brings each dowel to its foot on the present surface.
   void SlideDowels() {
     double farthest_mm = 0;
     for (SlidingDowel& dowel : dowels_) {

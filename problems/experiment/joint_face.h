@@ -9,21 +9,21 @@
 namespace semblance::problems {
 
 // Starts from the most likely face of the model. Each round seeds the implicit face below the
-// surface and runs the schedule of fit.plan. Before each step of it
+// surface and runs the schedule of fit.plan. In each step of it
 //
-//   - every dowel slides to the foot of its tip on the surface. There the surface is drawn to the
-//     tip along its normal, tightly, and at the site's own (u,v) across it, loosely. That is the
-//     parametric relaxation of the dowels (docs/explanation/mathematics-fit.md). A dowel that is
-//     held by `sites` does not slide;
+//   - every dowel stands at the foot of its tip on the surface, to which it slid after the step
+//     before. There the surface is drawn to the tip along its normal, tightly, and at the site's
+//     own (u,v), which `sites` may state, across it, loosely. That is the parametric relaxation of
+//     the dowels (docs/explanation/mathematics-fit.md). A dowel that `sites` holds does not slide;
 //   - every seed draws the surface along the normal of the implicit face, with the standard
 //     deviation that the implicit face has there. All seeds together are worth
 //     estimate.surface_worth independent points;
 //   - rules draw the model's points, as in the estimate of the start.
 //
 // Then SolveJointStep moves vertices, coefficients and pose by the step's fraction. Dowels, seeds
-// and marks have Huber losses of the widths of `estimate`. `made.prior` is the model at the
-// solution; sigma and draws are those of the start, moved with it. Throws InputError as
-// FindLikelyFace does; Cancelled.
+// and marks have Huber losses of the widths of `estimate`. `made.prior` has the model at the
+// solution. Its sigma and draws are those of the start, moved with it; its residuals and weights of
+// tips and marks are those of the start. Throws InputError as FindLikelyFace does; Cancelled.
 MadeFace MakeJointFace(const JointFace& options, PlacedTemplate placed, const FaceInput& in,
                        const RunContext& context);
 

@@ -86,6 +86,7 @@ TEST(JointFace, EveryStepOfTheScheduleIsOneProblemThatLowersItsCost) {
   const RunResult& joint = PlainRun("joint");
   ASSERT_TRUE(joint.usable());
   ASSERT_EQ(joint.fit.levels.size(), PublishedSchedule().size());
+  EXPECT_EQ(joint.fit.relaxations.size(), joint.fit.levels.size());
   for (std::size_t k = 0; k < joint.fit.levels.size(); ++k) {
     const LevelSummary& level = joint.fit.levels[k];
     EXPECT_EQ(level.level, PublishedSchedule()[k].level);
@@ -103,13 +104,15 @@ TEST(JointFace, EveryStepOfTheScheduleIsOneProblemThatLowersItsCost) {
 }
 
 TEST(JointFace, DowelsSlideUnlessTheyAreHeld) {
-  const RunResult result = RunSmall("joint", {"sites={n: {uv: [0.5, 0.6], hold: true}}"});
+  const RunResult result =
+      RunSmall("joint", {"sites={n: {uv: [0.5, 0.6], hold: true}, g: {uv: [0.5, 0.64]}}"});
   int slid = 0;
   for (std::size_t k = 0; k < result.target.points.size(); ++k) {
     const FitPoint& point = result.target.points[k];
     if (point.label == "n") {
       EXPECT_EQ(result.fit.uv[k], Vec2(0.5, 0.6));
     } else if (point.role != PointRole::kSeed) {
+      EXPECT_TRUE(point.label != "g" || point.uv == Vec2(0.5, 0.64));  // stated, and free to slide
       slid += (result.fit.uv[k] - point.uv).norm() > 1e-4 ? 1 : 0;
     }
   }
