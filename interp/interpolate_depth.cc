@@ -6,6 +6,14 @@
 #include <type_traits>
 
 namespace semblance::interp {
+namespace {
+
+// A choice that is no scheme of the dowels alone.
+template <class Scheme>
+constexpr bool IsApart =
+    std::is_same_v<Scheme, PopulationDepth> || std::is_same_v<Scheme, DepthMap>;
+
+}  // namespace
 
 DepthField InterpolateDepth(const DepthScheme& scheme, const DepthInput& input,
                             const RunContext& run) {
@@ -19,6 +27,8 @@ bool NeedsSurface(const DepthScheme& scheme) {
         using Scheme = std::decay_t<decltype(options)>;
         if constexpr (std::is_same_v<Scheme, AutoScheme>) {
           return std::ranges::any_of(options.schemes, SingleNeedsSurface);
+        } else if constexpr (std::is_same_v<Scheme, PopulationDepth>) {
+          return true;
         } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
           return false;
         } else {
@@ -34,7 +44,7 @@ bool NeedsExpected(const DepthScheme& scheme) {
         using Scheme = std::decay_t<decltype(options)>;
         if constexpr (std::is_same_v<Scheme, AutoScheme>) {
           return std::ranges::any_of(options.schemes, SingleNeedsExpected);
-        } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
+        } else if constexpr (IsApart<Scheme>) {
           return false;
         } else {
           return SingleNeedsExpected(options);
@@ -49,7 +59,7 @@ bool NeedsNetwork(const DepthScheme& scheme) {
         using Scheme = std::decay_t<decltype(options)>;
         if constexpr (std::is_same_v<Scheme, AutoScheme>) {
           return std::ranges::all_of(options.schemes, SingleNeedsNetwork);
-        } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
+        } else if constexpr (IsApart<Scheme>) {
           return false;
         } else {
           return SingleNeedsNetwork(options);
@@ -67,6 +77,8 @@ std::size_t FewestDowels(const DepthScheme& scheme) {
           return schemes.empty()
                      ? 1
                      : std::ranges::min(schemes | std::views::transform(SingleFewestDowels));
+        } else if constexpr (std::is_same_v<Scheme, PopulationDepth>) {
+          return 6;
         } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
           return 1;
         } else {

@@ -8,14 +8,17 @@
 #include <variant>
 
 #include "interp/schemes/depth_map.h"
+#include "interp/schemes/population_depth.h"
 #include "interp/stacking/auto_scheme.h"
 #include "interp/stacking/single_scheme.h"
 
 namespace semblance::interp {
 
-// All choices: the single schemes, the mixture of several, and a map in place of a scheme.
+// All choices: the single schemes, the mixture of several, people's depths given the dowels, and a
+// map in place of a scheme.
 template <class... Single>
-std::variant<Single..., AutoScheme, DepthMap> WithTheRest(const std::variant<Single...>&);
+std::variant<Single..., AutoScheme, PopulationDepth, DepthMap> WithTheRest(
+    const std::variant<Single...>&);
 using DepthScheme = decltype(WithTheRest(std::declval<SingleScheme>()));
 
 // Interpolates the depths. At vertices with status kAssigned the depth is finite and within the

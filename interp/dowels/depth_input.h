@@ -58,6 +58,8 @@ struct DepthInput {
   // Depths that are expected before any measurement, such as a population's mean depths at its
   // sites. They are dowels on this skull, also at sites without a measured depth. May be empty.
   std::span<const Dowel> expected = {};
+  // The bone that `skull` was filled from, or null if `skull` is the bone itself.
+  const TriMesh* bone = nullptr;
 };
 
 // Throws InputError if there is no dowel; if a dowel (also an expected one) lacks a finite base, a

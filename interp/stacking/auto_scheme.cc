@@ -143,7 +143,8 @@ Mixture Choose(const AutoScheme& options, const DepthInput& input, const RunCont
     return mixture;
   }
   const ShownDowels shown = ChooseTestDowels(input);
-  const DepthInput tested{input.skull, input.normals, shown.dowels, shown.network, input.expected};
+  const DepthInput tested{input.skull,   input.normals,  shown.dowels,
+                          shown.network, input.expected, input.bone};
   Eigen::MatrixXd errors(std::ssize(shown.dowels), std::ssize(mixture.schemes));
   for (Eigen::Index k = 0; k < errors.cols(); ++k) {
     errors.col(k) = LeftOutErrors(mixture.schemes[k], tested, run);

@@ -66,7 +66,7 @@ DepthField AtCorners(const Interpolator& scheme, const DepthInput& all, const Sh
                      const Fold& fold, const std::vector<std::size_t>& corners,
                      const RunContext& run) {
   const DepthField field = Interpolated(
-      scheme, {all.skull, all.normals, shown.dowels, shown.network, all.expected}, run);
+      scheme, {all.skull, all.normals, shown.dowels, shown.network, all.expected, all.bone}, run);
   DepthField at = EmptyDepthField(fold.size());
   for (std::size_t k = 0; k < fold.size(); ++k) {
     const std::size_t corner = corners[fold[k]];

@@ -49,7 +49,7 @@ struct DepthStage {
   DepthField depth;                      // of the shell's vertices, after the outside rule
 
   DepthInput Input() const {
-    return {shell, normals, dowels_on_shell, subject.network, expected_on_shell};
+    return {shell, normals, dowels_on_shell, subject.network, expected_on_shell, &subject.skull};
   }
 };
 

@@ -63,7 +63,8 @@ std::int32_t NearestCorner(const TriMesh& shell, const MeshPoint& at) {
 // schemes also cover the error between dowels, which kriging states here already.
 bool StatesDowelsAlone(const Experiment& experiment) {
   return !std::holds_alternative<SurfaceMatern>(experiment.interp) &&
-         !std::holds_alternative<AutoScheme>(experiment.interp);
+         !std::holds_alternative<AutoScheme>(experiment.interp) &&
+         !std::holds_alternative<PopulationDepth>(experiment.interp);
 }
 
 std::vector<DepthBehind> DepthsBehind(const Experiment& experiment, const FitTarget& target,
@@ -158,8 +159,8 @@ PointErrors FindPointErrors(const Experiment& experiment, const DepthStage& stag
                             const HSplineSurface& surface, const FitTarget& target,
                             FaceUncertainty& result, const RunContext& context) {
   const std::vector<Dowel> dowels = WithSd(stage.dowels_on_shell, experiment);
-  const DepthInput input{stage.shell, stage.normals, dowels, stage.subject.network,
-                         stage.expected_on_shell};
+  const DepthInput input{stage.shell,           stage.normals,           dowels,
+                         stage.subject.network, stage.expected_on_shell, &stage.subject.skull};
   const std::vector<DepthBehind> depths = DepthsBehind(experiment, target, stage, dowels, context);
   Eigen::MatrixXd covariance = DepthCovariance(experiment, input, depths, result, context);
   PointErrors errors;

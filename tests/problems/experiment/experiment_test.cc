@@ -115,6 +115,23 @@ TEST(Experiment, AUsedPriorNamesItsFiles) {
 
 TEST(Experiment, TheDefaultsFitTogether) { EXPECT_THAT(FaultsBetween(Experiment{}), IsEmpty()); }
 
+// configs/people.yaml as a base changes the scheme and the generic face, and nothing of the
+// subject.
+TEST(Experiment, WhatPeopleTeachIsOneBaseAway) {
+  const testing::ScratchFolder folder;
+  const std::string configs = SEMBLANCE_SOURCE_DIR "/configs/";
+  const Experiment demo = ReadConfig<Experiment>(configs + "demo.yaml");
+  const Experiment people = ReadConfigText<Experiment>(
+      fmt::format("base: [{0}demo.yaml, {0}people.yaml]\n", configs), folder / "e.yaml");
+  EXPECT_THAT(FaultsBetween(people), IsEmpty());
+  EXPECT_EQ(StageKey("", people.subject), StageKey("", demo.subject));
+  EXPECT_EQ(StageKey("", people.tissue), StageKey("", demo.tissue));
+  EXPECT_TRUE(std::holds_alternative<PopulationDepth>(people.interp));
+  EXPECT_TRUE(std::holds_alternative<HSplinePrior>(people.prior));
+  EXPECT_TRUE(std::filesystem::exists(std::get<FileTemplate>(people.face_template).surface));
+  EXPECT_NE(StageKey("", people.face_template), StageKey("", demo.face_template));
+}
+
 // configs/published.yaml as a base of a subject gives the way of the thesis with the subject's
 // depths.
 TEST(Experiment, ThePublishedWayIsOneBaseAway) {

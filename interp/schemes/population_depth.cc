@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/population_depth.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "interp/dowels/dowel_samples.h"
+#include "interp/schemes/people.h"
+#include "interp/schemes/radial_basis.h"
+
+namespace semblance::interp {
+namespace {
+
+// What people's points say about one place of the skull.
+struct Expected {
+  Vec3 place = Vec3::Constant(kNaN);
+  LogDepth depth;
+  double gap_mm = kNaN;
+  double nearest_mm = kNaN;  // to the nearest of the points
+};
+
+// The Gaussian mean of the points around a place. Points that face away hardly count.
+Expected ExpectedAt(const std::vector<SubjectPoint>& points, const Vec3& place,
+                    const Vec3& normal) {
+  constexpr double kWidth_mm = 6;  // about the distance of neighbouring points
+  constexpr double kAway = 0.05;
+  Expected at{place, {0, 0, 0}, 0, std::numeric_limits<double>::infinity()};
+  for (const SubjectPoint& point : points) {
+    at.nearest_mm = std::min(at.nearest_mm, (point.on_skull - place).norm());
+  }
+  double weights = 0;
+  for (const SubjectPoint& point : points) {
+    // The nearest point has the weight 1 at any distance, so that no sum vanishes.
+    const double beyond = (point.on_skull - place).squaredNorm() - at.nearest_mm * at.nearest_mm;
+    const double weight =
+        std::exp(-beyond / (2 * kWidth_mm * kWidth_mm)) * std::max(kAway, point.normal.dot(normal));
+    at.depth.mean += weight * point.depth.mean;
+    at.depth.sd += weight * point.depth.sd;
+    at.depth.loading += weight * point.depth.loading;
+    at.gap_mm += weight * point.gap_mm;
+    weights += weight;
+  }
+  at.depth.mean /= weights;
+  at.depth.sd /= weights;
+  at.depth.loading /= weights;
+  at.gap_mm /= weights;
+  return at;
+}
+
+double Matern32(double distance_mm, double range_mm) {
+  const double r = std::sqrt(3.0) * distance_mm / range_mm;
+  return (1 + r) * std::exp(-r);
+}
+
+double CovarianceBetween(const Expected& a, const Expected& b, double range_mm) {
+  const double la = a.depth.loading, lb = b.depth.loading;
+  const double rest = std::sqrt((1 - la * la) * (1 - lb * lb));
+  return a.depth.sd * b.depth.sd *
+         (la * lb + rest * Matern32((a.place - b.place).norm(), range_mm));
+}
+
+// A dowel that people's points reach.
+struct KnownDepth {
+  Expected expected;
+  double log_depth = kNaN;  // from the bone
+  double variance = kNaN;   // of its error
+};
+
+std::vector<KnownDepth> KnownDepths(const PopulationDepth& options, const People& people,
+                                    const std::vector<SubjectPoint>& points,
+                                    const DepthInput& input) {
+  std::vector<Dowel> dowels(input.dowels.begin(), input.dowels.end());
+  std::ranges::sort(dowels, {}, &Dowel::site);  // so that their order does not matter
+  std::vector<KnownDepth> known;
+  for (const Dowel& dowel : dowels) {
+    Expected at = ExpectedAt(points, dowel.base, dowel.direction);
+    if (const auto site = people.sites.find(dowel.site); site != people.sites.end()) {
+      at.depth = site->second.depth;
+    } else if (at.nearest_mm > options.reach_mm) {
+      continue;
+    }
+    const double depth_mm = dowel.depth_mm + at.gap_mm;
+    const double own = std::isfinite(dowel.sd_mm) ? dowel.sd_mm / depth_mm : 0;
+    known.push_back({at, std::log(depth_mm), options.error * options.error + own * own});
+  }
+  return known;
+}
+
+// The process given the dowels.
+class Conditioned {
+ public:
+  Conditioned(std::vector<KnownDepth> known, double range_mm)
+      : known_(std::move(known)), range_mm_(range_mm) {
+    const auto n = static_cast<Eigen::Index>(known_.size());
+    Eigen::MatrixXd covariance(n, n);
+    Eigen::VectorXd surprise(n);
+    for (Eigen::Index i = 0; i < n; ++i) {
+      for (Eigen::Index j = 0; j < n; ++j) {
+        covariance(i, j) = CovarianceBetween(known_[i].expected, known_[j].expected, range_mm_);
+      }
+      covariance(i, i) += known_[i].variance;
+      surprise[i] = known_[i].log_depth - known_[i].expected.depth.mean;
+    }
+    factor_.compute(covariance);
+    weights_ = factor_.solve(surprise);
+  }
+
+  // Depth on the skull, and its deviation.
+  DepthValue At(const Expected& place) const {
+    const auto n = static_cast<Eigen::Index>(known_.size());
+    Eigen::VectorXd to_known(n);
+    for (Eigen::Index k = 0; k < n; ++k) {
+      to_known[k] = CovarianceBetween(place, known_[k].expected, range_mm_);
+    }
+    const double from_bone_mm = std::exp(place.depth.mean + to_known.dot(weights_));
+    const double variance = place.depth.sd * place.depth.sd - to_known.dot(factor_.solve(to_known));
+    return {from_bone_mm - place.gap_mm, from_bone_mm * std::sqrt(std::max(0.0, variance))};
+  }
+
+ private:
+  std::vector<KnownDepth> known_;
+  double range_mm_;
+  Eigen::LDLT<Eigen::MatrixXd> factor_;
+  Eigen::VectorXd weights_;
+};
+
+// 0 where people reach, 1 beyond twice their reach, smooth between.
+double ShareOfFallback(double nearest_mm, double reach_mm) {
+  return SmoothStep(nearest_mm / reach_mm - 1);
+}
+
+}  // namespace
+
+DepthField InterpolateDepth(const PopulationDepth& options, const DepthInput& input,
+                            const RunContext& run) {
+  CheckDepthInput(input);
+  CheckSurface(PopulationDepth::kName, input.skull);
+  const People& people = CarriedPeople();
+  const std::vector<SubjectPoint> points = CarryToSubject(people, input, run);
+  const std::vector<DepthSample> samples = DepthSamples(input.dowels);
+  const DepthLimits limits(samples, false);
+  const DepthField beyond =
+      InterpolateDepth(RadialBasis{.max_angle_deg = options.max_angle_deg}, input, run);
+  if (points.empty()) {
+    return beyond;
+  }
+  const Conditioned person(KnownDepths(options, people, points, input), options.range_mm);
+  return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
+    const Expected place = ExpectedAt(points, input.skull.points[i], input.normals[i]);
+    const double share = ShareOfFallback(place.nearest_mm, options.reach_mm);
+    const DepthValue own = person.At(place);
+    return DepthValue{
+        limits(share < 1 ? (1 - share) * own.mm + share * beyond.depth_mm[i] : beyond.depth_mm[i]),
+        share > 0 ? kNaN : own.sd_mm};
+  });
+}
+
+}  // namespace semblance::interp

@@ -1,0 +1,231 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "interp/schemes/population_depth.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "interp/schemes/people.h"
+#include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
+#include "tests/testing/dowel_scenes.h"
+
+namespace semblance::interp {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A person whose bone is the mean bone, moved by a similarity: one small triangle per point.
+struct Person {
+  TriMesh bone;
+  std::vector<Vec3> normals;
+  std::vector<Dowel> dowels;
+  DowelNetwork network;
+  const TriMesh* filled_from = nullptr;
+
+  // builds: how many standard deviations of build the dowels are thicker than people's mean.
+  explicit Person(double builds = 0, const Similarity& place = {}) {
+    for (const PeoplePoint& point : CarriedPeople().bone) {
+      AddTriangle(point, place);
+    }
+    for (const auto& [site, point] : CarriedPeople().sites) {
+      const double log_mm = point.depth.mean + builds * point.depth.loading * point.depth.sd;
+      dowels.push_back(
+          {site, place * point.position, place.rotation * point.normal, std::exp(log_mm)});
+    }
+  }
+
+  void AddTriangle(const PeoplePoint& point, const Similarity& place) {
+    constexpr double kRadius_mm = 2;
+    const Vec3 a = point.normal.unitOrthogonal(), b = point.normal.cross(a);
+    const int first = static_cast<int>(bone.points.size());
+    for (int k = 0; k < 3; ++k) {
+      const double angle = 2 * EIGEN_PI * k / 3;
+      bone.points.push_back(
+          place * (point.position + kRadius_mm * (std::cos(angle) * a + std::sin(angle) * b)));
+      normals.emplace_back(place.rotation * point.normal);
+    }
+    bone.triangles.push_back({first, first + 1, first + 2});
+  }
+
+  DepthInput Input() const { return {bone, normals, dowels, network, {}, filled_from}; }
+  DepthField Depth(const PopulationDepth& options = {}, int threads = 1) const {
+    RunContext run;
+    run.threads = threads;
+    return InterpolateDepth(options, Input(), run);
+  }
+};
+
+Similarity TurnedAndLarger() {
+  Similarity place;
+  place.scale = 1.08;
+  place.rotation = Eigen::AngleAxisd(0.7, Vec3(1, 2, -1).normalized()).toRotationMatrix();
+  place.translation = Vec3(100, -50, 30);
+  return place;
+}
+
+double MedianRatio(const DepthField& a, const DepthField& b) {
+  std::vector<double> ratios;
+  for (std::size_t v = 0; v < a.depth_mm.size(); ++v) {
+    if (std::isfinite(a.depth_mm[v]) && std::isfinite(b.depth_mm[v])) {
+      ratios.push_back(a.depth_mm[v] / b.depth_mm[v]);
+    }
+  }
+  EXPECT_GT(ratios.size(), a.depth_mm.size() / 2);
+  return UpperMedian(ratios);
+}
+
+TEST(CarryToSubject, FindsTheMeanBoneWhereItStands) {
+  const Similarity place = TurnedAndLarger();
+  const Person person(0, place);
+  const std::vector<SubjectPoint> points =
+      CarryToSubject(CarriedPeople(), person.Input(), RunContext{});
+  ASSERT_EQ(points.size(), CarriedPeople().bone.size());
+  std::vector<double> off_mm;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    off_mm.push_back((points[i].on_skull - place * CarriedPeople().bone[i].position).norm());
+    EXPECT_EQ(points[i].gap_mm, 0);
+  }
+  EXPECT_LT(UpperMedian(off_mm), 0.5);
+}
+
+TEST(PopulationDepth, APersonWithPeoplesMeanHasItEverywhereForEveryRange) {
+  const Person person;
+  const DepthField near = person.Depth({.range_mm = 5}), far = person.Depth({.range_mm = 80});
+  std::vector<double> off;
+  for (std::size_t i = 0; i < CarriedPeople().bone.size(); ++i) {
+    const std::size_t v = 3 * i;
+    if (near.status[v] == DepthStatus::kAssigned) {
+      EXPECT_NEAR(near.depth_mm[v], far.depth_mm[v], 0.01 * far.depth_mm[v]);
+      off.push_back(std::abs(std::log(near.depth_mm[v]) - CarriedPeople().bone[i].depth.mean));
+    }
+  }
+  ASSERT_GT(off.size(), 1000U);
+  EXPECT_LT(UpperMedian(off), 0.1);  // neighbouring points are averaged
+}
+
+TEST(PopulationDepth, AHeavierPersonIsThickerBetweenTheDowels) {
+  const DepthField mean = Person().Depth(), heavy = Person(2).Depth(), thin = Person(-2).Depth();
+  EXPECT_GT(MedianRatio(heavy, mean), 1.15);
+  EXPECT_LT(MedianRatio(thin, mean), 0.87);
+}
+
+// The process as a dense Gaussian conditional, for a single dowel.
+TEST(PopulationDepth, OneDeviatingDowelMovesItsPlaceAlmostToItsDepth) {
+  Person person;
+  const DepthField before = person.Depth();
+  Dowel& zy = *std::ranges::find(person.dowels, "zy_l", &Dowel::site);
+  std::size_t nearest = 0;
+  for (std::size_t v = 0; v < person.bone.points.size(); ++v) {
+    if ((person.bone.points[v] - zy.base).norm() < (person.bone.points[nearest] - zy.base).norm()) {
+      nearest = v;
+    }
+  }
+  zy.depth_mm *= 1.5;
+  const DepthField after = person.Depth();
+  const double moved = std::log(after.depth_mm[nearest] / before.depth_mm[nearest]);
+  EXPECT_GT(moved, 0.5 * std::log(1.5));
+  EXPECT_LT(moved, 1.1 * std::log(1.5));
+  zy.sd_mm = 100;  // so uncertain that the others decide
+  EXPECT_NEAR(person.Depth().depth_mm[nearest], before.depth_mm[nearest],
+              0.15 * before.depth_mm[nearest]);
+}
+
+TEST(PopulationDepth, TheGapOfAFilledSkullIsTakenOff) {
+  constexpr double kGap_mm = 6;
+  const Person bone;
+  Person filled = bone;
+  filled.filled_from = &bone.bone;
+  const auto in_fossa = [&](std::size_t v) {
+    return std::abs(bone.bone.points[v].x()) > 45 && bone.bone.points[v].z() > 20 &&
+           bone.bone.points[v].y() > -75;
+  };
+  for (std::size_t v = 0; v < filled.bone.points.size(); ++v) {
+    filled.bone.points[v] += (in_fossa(v) ? kGap_mm : 0) * filled.normals[v];
+  }
+  const DepthField from_bone = bone.Depth(), from_shell = filled.Depth();
+  std::vector<double> taken_off_mm;
+  for (std::size_t v = 0; v < filled.bone.points.size(); ++v) {
+    if (in_fossa(v) && from_bone.depth_mm[v] > 2 * kGap_mm) {
+      taken_off_mm.push_back(from_bone.depth_mm[v] - from_shell.depth_mm[v]);
+    }
+  }
+  ASSERT_GT(taken_off_mm.size(), 50U);
+  EXPECT_NEAR(UpperMedian(taken_off_mm), kGap_mm, 1);
+}
+
+TEST(PopulationDepth, TurnsWithTheHeadAndGrowsNotWithIt) {
+  Similarity turn = TurnedAndLarger();
+  turn.scale = 1;
+  const DepthField still = Person(1).Depth(), turned = Person(1, turn).Depth();
+  for (std::size_t v = 0; v < still.depth_mm.size(); ++v) {
+    ASSERT_EQ(still.status[v], turned.status[v]);
+    if (std::isfinite(still.depth_mm[v])) {
+      EXPECT_NEAR(still.depth_mm[v], turned.depth_mm[v], 1e-6);
+    }
+  }
+}
+
+TEST(PopulationDepth, HasTheSameBytesForAnyOrderOfDowelsAndAnyNumberOfThreads) {
+  Person person(0.7);
+  const DepthField one = person.Depth();
+  std::ranges::reverse(person.dowels);
+  const DepthField other = person.Depth({}, 3);
+  for (std::size_t v = 0; v < one.depth_mm.size(); ++v) {
+    EXPECT_TRUE(one.depth_mm[v] == other.depth_mm[v] ||
+                (std::isnan(one.depth_mm[v]) && std::isnan(other.depth_mm[v])));
+  }
+}
+
+TEST(PopulationDepth, StatesAnSdThatGrowsAwayFromTheDowels) {
+  const DepthField field = Person().Depth();
+  std::vector<double> shares;
+  for (std::size_t v = 0; v < field.sd_mm.size(); ++v) {
+    if (std::isfinite(field.sd_mm[v])) {
+      shares.push_back(field.sd_mm[v] / field.depth_mm[v]);
+      EXPECT_GT(shares.back(), 0);
+    }
+  }
+  ASSERT_GT(shares.size(), 1000U);
+  const auto [least, most] = std::ranges::minmax(shares);
+  EXPECT_LT(least, 0.15);
+  EXPECT_GT(most, 2 * least);
+}
+
+TEST(PopulationDepth, NeedsSixSitesAndNamesTheRemedy) {
+  Person person;
+  person.dowels.resize(5);
+  try {
+    person.Depth();
+    FAIL() << "no error";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("5 of them stand at known sites; at least 6"));
+  }
+}
+
+TEST(ReadPeople, NamesTheLineOfABadRow) {
+  const auto error = [](const std::string& row) {
+    try {
+      ReadPeople(
+          "site,x_mm,y_mm,z_mm,normal_x,normal_y,normal_z,log_mean,log_sd,loading\n"
+          ",1,2,3,0,0,1,2,0.3,0.4\n" +
+              row,
+          "people.csv");
+    } catch (const Error& e) {
+      return std::string(e.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_EQ(error("g,1,2,3,0,0,1,2,0.3,0.4\n"), "no error");
+  EXPECT_THAT(error(",1,2,3,0,0,1,2,0,0.4\n"), HasSubstr("people.csv:3: the normal must not be"));
+  EXPECT_THAT(error(",1,2,3,0,0,1,2,0.3,1.4\n"), HasSubstr("people.csv:3"));
+  EXPECT_THAT(error("g,1,2,3,0,0,1,2,0.3,0.4\ng,1,2,3,0,0,1,2,0.3,0.4\n"),
+              HasSubstr("site g has a second row"));
+}
+
+}  // namespace
+}  // namespace semblance::interp
