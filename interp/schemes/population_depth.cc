@@ -89,6 +89,13 @@ std::vector<KnownDepth> KnownDepths(const PopulationDepth& options, const People
   return known;
 }
 
+// What is left of the tissue outside the filled skull: at least 1 mm, which dowels there have at
+// least, too. An implicit surface has holes over thinner tissue.
+double OutsideGap(double from_bone_mm, double gap_mm) {
+  constexpr double kLeast_mm = 1;
+  return std::max(from_bone_mm - gap_mm, std::min(from_bone_mm, kLeast_mm));
+}
+
 // The process given the dowels.
 class Conditioned {
  public:
@@ -117,7 +124,8 @@ class Conditioned {
     }
     const double from_bone_mm = std::exp(place.depth.mean + to_known.dot(weights_));
     const double variance = place.depth.sd * place.depth.sd - to_known.dot(factor_.solve(to_known));
-    return {from_bone_mm - place.gap_mm, from_bone_mm * std::sqrt(std::max(0.0, variance))};
+    return {OutsideGap(from_bone_mm, place.gap_mm),
+            from_bone_mm * std::sqrt(std::max(0.0, variance))};
   }
 
  private:

@@ -158,6 +158,18 @@ TEST(PopulationDepth, TheGapOfAFilledSkullIsTakenOff) {
   EXPECT_NEAR(UpperMedian(taken_off_mm), kGap_mm, 1);
 }
 
+TEST(PopulationDepth, AMillimetreIsLeftWhereTheGapIsDeeperThanTheTissue) {
+  const Person bone;
+  Person filled = bone;
+  filled.filled_from = &bone.bone;
+  for (std::size_t v = 0; v < filled.bone.points.size(); ++v) {
+    filled.bone.points[v] += 35 * filled.normals[v];
+  }
+  for (const double depth_mm : filled.Depth({.reach_mm = 60}).depth_mm) {
+    EXPECT_FALSE(depth_mm < 0.99) << depth_mm;  // without a depth where the bone turns away
+  }
+}
+
 TEST(PopulationDepth, TurnsWithTheHeadAndGrowsNotWithIt) {
   Similarity turn = TurnedAndLarger();
   turn.scale = 1;
