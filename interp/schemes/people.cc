@@ -135,6 +135,8 @@ void MoveSmoothly(Carried& carried, const Feet& feet, double width_mm, int threa
 }
 
 // A person's bone differs from the mean first in size and proportions, then in ever smaller forms.
+// The widths are those with which the mean bone itself was laid on the 54 heads. A wider reach
+// finds bone of another part, a narrower one loses a long face.
 void FollowBone(Carried& carried, const Correspondences& bone, const RunContext& run) {
   struct Stage {
     double width_mm;
@@ -183,9 +185,11 @@ const People& CarriedPeople() {
 std::vector<SubjectPoint> CarryToSubject(const People& people, const DepthInput& input,
                                          const RunContext& run) {
   constexpr double kFarthest_mm = 6;  // from the bone; a point farther off stands for missing bone
+  constexpr std::size_t kFewest = 4;  // one in so many points; skulls without mandible have most
   const TriMesh& bone = input.bone != nullptr ? *input.bone : input.skull;
   Carried carried = Place(people, PlateThroughSites(people, input));
-  const Correspondences on_bone(bone);
+  // Points beyond the end of a scan would pile up at its border.
+  const Correspondences on_bone(bone, OpenBorder::kReject);
   FollowBone(carried, on_bone, run);
   const Feet feet = FindFeet(carried, on_bone, kFarthest_mm, run.threads);
   const MeshQuery skull(input.skull);
@@ -196,6 +200,13 @@ std::vector<SubjectPoint> CarryToSubject(const People& people, const DepthInput&
       const double gap_mm = input.bone ? GapTo(skull, carried.points[i], normal) : 0;
       points.push_back({carried.points[i] + gap_mm * normal, normal, people.bone[i].depth, gap_mm});
     }
+  }
+  if (points.size() * kFewest < people.bone.size()) {
+    throw InputError(fmt::format(
+        "interp: population finds bone at {} of {} points of people's facial bone; the skull lacks "
+        "most of its face, or its landmarks are wrong. Check the landmarks, or choose another "
+        "scheme, for example barycentric",
+        points.size(), people.bone.size()));
   }
   return points;
 }

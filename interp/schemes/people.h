@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What is known of people's tissue depth all over the facial bone, carried onto one skull.
+// People's distribution of tissue depth all over the facial bone, and how it is carried onto one
+// skull.
 #pragma once
 
 #include <map>
@@ -54,7 +55,8 @@ struct SubjectPoint {
 // Carries the mean bone onto input.bone (input.skull without it): by a thin plate through the sites
 // of the dowels, then along smooth displacements towards the closest bone that faces the same way.
 // Points with no such bone within a few mm are left out. Throws InputError if fewer than six dowels
-// stand at sites of the people, or if these lie in a plane.
+// stand at sites of the people, if these lie in a plane, or if less than a quarter of the points
+// find bone.
 std::vector<SubjectPoint> CarryToSubject(const People& people, const DepthInput& input,
                                          const RunContext& run);
 

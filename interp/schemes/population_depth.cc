@@ -8,13 +8,14 @@
 #include <vector>
 
 #include "interp/dowels/dowel_samples.h"
+#include "interp/kriging/kriging_process.h"
 #include "interp/schemes/people.h"
 #include "interp/schemes/radial_basis.h"
 
 namespace semblance::interp {
 namespace {
 
-// What people's points say about one place of the skull.
+// The expectation from people's points at one place of the skull.
 struct Expected {
   Vec3 place = Vec3::Constant(kNaN);
   LogDepth depth;
@@ -26,7 +27,7 @@ struct Expected {
 Expected ExpectedAt(const std::vector<SubjectPoint>& points, const Vec3& place,
                     const Vec3& normal) {
   constexpr double kWidth_mm = 6;  // about the distance of neighbouring points
-  constexpr double kAway = 0.05;
+  constexpr double kAway = 0.05;   // keeps the sum of weights above 0 on the far side of thin bone
   Expected at{place, {0, 0, 0}, 0, std::numeric_limits<double>::infinity()};
   for (const SubjectPoint& point : points) {
     at.nearest_mm = std::min(at.nearest_mm, (point.on_skull - place).norm());
@@ -50,16 +51,12 @@ Expected ExpectedAt(const std::vector<SubjectPoint>& points, const Vec3& place,
   return at;
 }
 
-double Matern32(double distance_mm, double range_mm) {
-  const double r = std::sqrt(3.0) * distance_mm / range_mm;
-  return (1 + r) * std::exp(-r);
-}
-
 double CovarianceBetween(const Expected& a, const Expected& b, double range_mm) {
   const double la = a.depth.loading, lb = b.depth.loading;
   const double rest = std::sqrt((1 - la * la) * (1 - lb * lb));
   return a.depth.sd * b.depth.sd *
-         (la * lb + rest * Matern32((a.place - b.place).norm(), range_mm));
+         (la * lb +
+          rest * CorrelationAt(Covariance::kMatern32, (a.place - b.place).norm(), range_mm).value);
 }
 
 // A dowel that people's points reach.
@@ -89,8 +86,8 @@ std::vector<KnownDepth> KnownDepths(const PopulationDepth& options, const People
   return known;
 }
 
-// What is left of the tissue outside the filled skull: at least 1 mm, which dowels there have at
-// least, too. An implicit surface has holes over thinner tissue.
+// The tissue outside the filled skull. At least 1 mm is left, as for dowels there, because an
+// implicit surface has holes over thinner tissue.
 double OutsideGap(double from_bone_mm, double gap_mm) {
   constexpr double kLeast_mm = 1;
   return std::max(from_bone_mm - gap_mm, std::min(from_bone_mm, kLeast_mm));
@@ -152,9 +149,6 @@ DepthField InterpolateDepth(const PopulationDepth& options, const DepthInput& in
   const DepthLimits limits(samples, false);
   const DepthField beyond =
       InterpolateDepth(RadialBasis{.max_angle_deg = options.max_angle_deg}, input, run);
-  if (points.empty()) {
-    return beyond;
-  }
   const Conditioned person(KnownDepths(options, people, points, input), options.range_mm);
   return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
     const Expected place = ExpectedAt(points, input.skull.points[i], input.normals[i]);

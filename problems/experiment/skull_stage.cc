@@ -220,7 +220,8 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
                    std::move(projected.dowels_on_shell),
                    std::move(expected.dowels_on_shell),
                    std::move(scored.dowels_on_shell),
-                   {}};
+                   {},
+                   !std::holds_alternative<NoFill>(e.fill)};
   stage.depth = step("interpolate depth", [&] {
     return ApplyOutsideRule(e.outside, stage.Input(),
                             InterpolateDepth(e.interp, stage.Input(), context), context);

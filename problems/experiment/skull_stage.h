@@ -47,9 +47,11 @@ struct DepthStage {
   std::vector<Dowel> expected_on_shell;  // subject.expected_on_bone, projected
   std::vector<Dowel> scored_on_shell;    // subject.scored_on_bone, projected
   DepthField depth;                      // of the shell's vertices, after the outside rule
+  bool filled = false;                   // the shell is more than the bone (`fill`)
 
   DepthInput Input() const {
-    return {shell, normals, dowels_on_shell, subject.network, expected_on_shell, &subject.skull};
+    return {shell,           normals,           dowels_on_shell,
+            subject.network, expected_on_shell, filled ? &subject.skull : nullptr};
   }
 };
 

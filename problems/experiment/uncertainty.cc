@@ -159,8 +159,8 @@ PointErrors FindPointErrors(const Experiment& experiment, const DepthStage& stag
                             const HSplineSurface& surface, const FitTarget& target,
                             FaceUncertainty& result, const RunContext& context) {
   const std::vector<Dowel> dowels = WithSd(stage.dowels_on_shell, experiment);
-  const DepthInput input{stage.shell,           stage.normals,           dowels,
-                         stage.subject.network, stage.expected_on_shell, &stage.subject.skull};
+  DepthInput input = stage.Input();
+  input.dowels = dowels;
   const std::vector<DepthBehind> depths = DepthsBehind(experiment, target, stage, dowels, context);
   Eigen::MatrixXd covariance = DepthCovariance(experiment, input, depths, result, context);
   PointErrors errors;

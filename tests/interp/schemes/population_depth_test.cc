@@ -19,7 +19,8 @@ namespace {
 
 using ::testing::HasSubstr;
 
-// A person whose bone is the mean bone, moved by a similarity: one small triangle per point.
+// A person whose bone is the mean bone, moved by a similarity: one thorn per point, a closed
+// tetrahedron whose outer side lies in the bone's surface.
 struct Person {
   TriMesh bone;
   std::vector<Vec3> normals;
@@ -30,7 +31,7 @@ struct Person {
   // builds: how many standard deviations of build the dowels are thicker than people's mean.
   explicit Person(double builds = 0, const Similarity& place = {}) {
     for (const PeoplePoint& point : CarriedPeople().bone) {
-      AddTriangle(point, place);
+      AddThorn(point, place);
     }
     for (const auto& [site, point] : CarriedPeople().sites) {
       const double log_mm = point.depth.mean + builds * point.depth.loading * point.depth.sd;
@@ -39,18 +40,24 @@ struct Person {
     }
   }
 
-  void AddTriangle(const PeoplePoint& point, const Similarity& place) {
-    constexpr double kRadius_mm = 2;
+  void AddThorn(const PeoplePoint& point, const Similarity& place) {
+    constexpr double kRadius_mm = 2, kDeep_mm = 4;
     const Vec3 a = point.normal.unitOrthogonal(), b = point.normal.cross(a);
     const int first = static_cast<int>(bone.points.size());
     for (int k = 0; k < 3; ++k) {
       const double angle = 2 * EIGEN_PI * k / 3;
       bone.points.push_back(
           place * (point.position + kRadius_mm * (std::cos(angle) * a + std::sin(angle) * b)));
-      normals.emplace_back(place.rotation * point.normal);
     }
-    bone.triangles.push_back({first, first + 1, first + 2});
+    bone.points.push_back(place * (point.position - kDeep_mm * point.normal));
+    normals.insert(normals.end(), 4, place.rotation * point.normal);
+    for (const Triangle& t : {Triangle{0, 1, 2}, {0, 3, 1}, {1, 3, 2}, {2, 3, 0}}) {
+      bone.triangles.push_back({first + t[0], first + t[1], first + t[2]});
+    }
   }
+
+  // Apices stay in the bone when their outer sides are lifted off it.
+  static bool IsApex(std::size_t vertex) { return vertex % 4 == 3; }
 
   DepthInput Input() const { return {bone, normals, dowels, network, {}, filled_from}; }
   DepthField Depth(const PopulationDepth& options = {}, int threads = 1) const {
@@ -98,7 +105,7 @@ TEST(PopulationDepth, APersonWithPeoplesMeanHasItEverywhereForEveryRange) {
   const DepthField near = person.Depth({.range_mm = 5}), far = person.Depth({.range_mm = 80});
   std::vector<double> off;
   for (std::size_t i = 0; i < CarriedPeople().bone.size(); ++i) {
-    const std::size_t v = 3 * i;
+    const std::size_t v = 4 * i;  // a corner of its outer side
     if (near.status[v] == DepthStatus::kAssigned) {
       EXPECT_NEAR(near.depth_mm[v], far.depth_mm[v], 0.01 * far.depth_mm[v]);
       off.push_back(std::abs(std::log(near.depth_mm[v]) - CarriedPeople().bone[i].depth.mean));
@@ -114,7 +121,6 @@ TEST(PopulationDepth, AHeavierPersonIsThickerBetweenTheDowels) {
   EXPECT_LT(MedianRatio(thin, mean), 0.87);
 }
 
-// The process as a dense Gaussian conditional, for a single dowel.
 TEST(PopulationDepth, OneDeviatingDowelMovesItsPlaceAlmostToItsDepth) {
   Person person;
   const DepthField before = person.Depth();
@@ -135,6 +141,40 @@ TEST(PopulationDepth, OneDeviatingDowelMovesItsPlaceAlmostToItsDepth) {
               0.15 * before.depth_mm[nearest]);
 }
 
+// Given the places, the logarithm of depth is linear in those of the dowels' depths.
+TEST(PopulationDepth, TheEffectsOfTwoDowelsMultiply) {
+  const auto depth = [](double zy, double go) {
+    Person person;
+    std::ranges::find(person.dowels, "zy_l", &Dowel::site)->depth_mm *= zy;
+    std::ranges::find(person.dowels, "go_l", &Dowel::site)->depth_mm *= go;
+    return person.Depth();
+  };
+  const DepthField none = depth(1, 1), zy = depth(1.3, 1), go = depth(1, 0.8),
+                   both = depth(1.3, 0.8);
+  int compared = 0;
+  for (std::size_t v = 0; v < none.depth_mm.size(); ++v) {
+    if (std::isfinite(none.sd_mm[v])) {  // where people alone decide
+      const double product = zy.depth_mm[v] * go.depth_mm[v] / none.depth_mm[v];
+      EXPECT_NEAR(both.depth_mm[v], product, 1e-9 * product);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 1000);
+}
+
+TEST(PopulationDepth, RefusesLandmarksAwayFromTheBone) {
+  Person person;
+  for (Dowel& dowel : person.dowels) {
+    dowel.base.y() += 40;
+  }
+  try {
+    person.Depth();
+    FAIL() << "no error";
+  } catch (const InputError& e) {
+    EXPECT_THAT(e.what(), HasSubstr("points of people's facial bone"));
+  }
+}
+
 TEST(PopulationDepth, TheGapOfAFilledSkullIsTakenOff) {
   constexpr double kGap_mm = 6;
   const Person bone;
@@ -145,12 +185,12 @@ TEST(PopulationDepth, TheGapOfAFilledSkullIsTakenOff) {
            bone.bone.points[v].y() > -75;
   };
   for (std::size_t v = 0; v < filled.bone.points.size(); ++v) {
-    filled.bone.points[v] += (in_fossa(v) ? kGap_mm : 0) * filled.normals[v];
+    filled.bone.points[v] += (in_fossa(v) && !Person::IsApex(v) ? kGap_mm : 0) * filled.normals[v];
   }
   const DepthField from_bone = bone.Depth(), from_shell = filled.Depth();
   std::vector<double> taken_off_mm;
   for (std::size_t v = 0; v < filled.bone.points.size(); ++v) {
-    if (in_fossa(v) && from_bone.depth_mm[v] > 2 * kGap_mm) {
+    if (in_fossa(v) && !Person::IsApex(v) && from_bone.depth_mm[v] > 2 * kGap_mm) {
       taken_off_mm.push_back(from_bone.depth_mm[v] - from_shell.depth_mm[v]);
     }
   }
@@ -163,7 +203,7 @@ TEST(PopulationDepth, AMillimetreIsLeftWhereTheGapIsDeeperThanTheTissue) {
   Person filled = bone;
   filled.filled_from = &bone.bone;
   for (std::size_t v = 0; v < filled.bone.points.size(); ++v) {
-    filled.bone.points[v] += 35 * filled.normals[v];
+    filled.bone.points[v] += (Person::IsApex(v) ? 0 : 35) * filled.normals[v];
   }
   for (const double depth_mm : filled.Depth({.reach_mm = 60}).depth_mm) {
     EXPECT_FALSE(depth_mm < 0.99) << depth_mm;  // without a depth where the bone turns away
