@@ -25,8 +25,9 @@ export const setState = (state, {whole = false} = {}) => {
 // Performs one action. If the program refuses it, nothing changes and the reason is shown. Returns true if it was done.
 export const act = async (name, details = {}) => {
   try {
-    setState(await post('act', {do: name, ...details}));
-    showMessage('');
+    const state = await post('act', {do: name, ...details});
+    showMessage('');  // first: a listener may show why a job that has already ended has failed
+    setState(state);
     return true;
   } catch (error) {
     showMessage(error.message);
