@@ -48,6 +48,7 @@ struct DepthField {
   std::vector<double> sd_mm;                 // NaN if the scheme states none
   std::vector<SchemeShare> shares = {};      // sum 1; empty for a single scheme
   std::optional<DepthProcess> process = {};  // set by schemes that are Gaussian processes
+  std::vector<std::string> notes = {};       // what a person should know of it
 };
 
 struct DepthInput {

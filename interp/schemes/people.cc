@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <optional>
+#include <utility>
 
 #include "interp/schemes/people_file.h"
 #include "surfaces/base/csv.h"
@@ -61,11 +62,8 @@ struct Carried {
   std::vector<Vec3> points, normals;
 };
 
-ThinPlate PlateThroughSites(const People& people, const DepthInput& input) {
-  constexpr std::size_t kFewest = 6;
-  // Landmarks are some 2 mm off. A stiffness of half of this smooths them and keeps the head's
-  // size.
-  constexpr double kStiffness_mm = 1;
+// Where the people's sites stand on the subject, by site code.
+std::map<std::string, Vec3> KnownSites(const People& people, const DepthInput& input) {
   std::map<std::string, Vec3> seen;
   for (const std::span<const Dowel> dowels : {input.expected, input.dowels}) {
     for (const Dowel& dowel : dowels) {
@@ -74,15 +72,31 @@ ThinPlate PlateThroughSites(const People& people, const DepthInput& input) {
       }
     }
   }
-  if (seen.size() < kFewest) {
-    throw InputError(fmt::format(
-        "interp: population places people's depths by the sites of the dowels, and {} of them "
-        "stand at known sites; at least {} are needed. Add landmarks, or choose another scheme, "
-        "for example barycentric",
-        seen.size(), kFewest));
+  return seen;
+}
+
+// Returns true if the sites do not fix the size of the head in all directions, as those in the
+// middle of the face.
+bool LieInAPlane(const People& people, const std::map<std::string, Vec3>& sites) {
+  // Standard deviation; all sites have 24, one side with the middle 7. With less, landmarks that
+  // are 2 mm off would turn or stretch the far side by 10 mm.
+  constexpr double kThinnest_mm = 6;
+  Eigen::Matrix3Xd places(3, std::ssize(sites));
+  Eigen::Index k = 0;
+  for (const auto& [site, base] : sites) {
+    places.col(k++) = people.sites.at(site).position;
   }
+  places.colwise() -= places.rowwise().mean().eval();
+  const double thinnest = Eigen::JacobiSVD<Eigen::Matrix3Xd>(places).singularValues()[2];
+  return thinnest < kThinnest_mm * std::sqrt(static_cast<double>(sites.size()));
+}
+
+ThinPlate PlateThrough(const People& people, const std::map<std::string, Vec3>& sites) {
+  // Landmarks are some 2 mm off. A stiffness of half of this smooths them and keeps the head's
+  // size.
+  constexpr double kStiffness_mm = 1;
   std::vector<Vec3> from, to;
-  for (const auto& [site, base] : seen) {
+  for (const auto& [site, base] : sites) {
     from.push_back(people.sites.at(site).position);
     to.push_back(base);
   }
@@ -160,6 +174,23 @@ double GapTo(const MeshQuery& skull, const Vec3& point, const Vec3& normal) {
   return hit && hit->distance_mm > kNone_mm ? hit->distance_mm : 0;
 }
 
+std::vector<SubjectPoint> PointsOnSkull(const People& people, const Carried& carried,
+                                        const Feet& feet, const DepthInput& input) {
+  const MeshQuery skull(input.skull);
+  std::vector<SubjectPoint> points;
+  for (std::size_t i = 0; i < carried.points.size(); ++i) {
+    const Vec3& normal = carried.normals[i];
+    const double gap_mm =
+        feet[i] && input.bone != nullptr ? GapTo(skull, carried.points[i], normal) : 0;
+    if (feet[i]) {
+      points.push_back({carried.points[i] + gap_mm * normal, normal, people.bone[i].depth, gap_mm});
+    }
+  }
+  return points;
+}
+
+CarriedBone Fault(std::string words) { return {{}, std::move(words)}; }
+
 }  // namespace
 
 People ReadPeople(std::string_view text, std::string_view name) {
@@ -182,33 +213,33 @@ const People& CarriedPeople() {
   return kPeople;
 }
 
-std::vector<SubjectPoint> CarryToSubject(const People& people, const DepthInput& input,
-                                         const RunContext& run) {
+CarriedBone CarryToSubject(const People& people, const DepthInput& input, const RunContext& run) {
   constexpr double kFarthest_mm = 6;  // from the bone; a point farther off stands for missing bone
+  constexpr std::size_t kFewestSites = 6;
   constexpr std::size_t kFewest = 4;  // one in so many points; skulls without mandible have most
+  const std::map<std::string, Vec3> sites = KnownSites(people, input);
+  if (sites.size() < kFewestSites) {
+    return Fault(fmt::format(
+        "{} dowels stand at sites whose depth in people is known, and at least {} place it",
+        sites.size(), kFewestSites));
+  }
+  if (LieInAPlane(people, sites)) {
+    return Fault("the dowels at known sites lie almost in one plane");
+  }
   const TriMesh& bone = input.bone != nullptr ? *input.bone : input.skull;
-  Carried carried = Place(people, PlateThroughSites(people, input));
+  Carried carried = Place(people, PlateThrough(people, sites));
   // Points beyond the end of a scan would pile up at its border.
   const Correspondences on_bone(bone, OpenBorder::kReject);
   FollowBone(carried, on_bone, run);
   const Feet feet = FindFeet(carried, on_bone, kFarthest_mm, run.threads);
-  const MeshQuery skull(input.skull);
-  std::vector<SubjectPoint> points;
-  for (std::size_t i = 0; i < carried.points.size(); ++i) {
-    if (feet[i]) {
-      const Vec3& normal = carried.normals[i];
-      const double gap_mm = input.bone ? GapTo(skull, carried.points[i], normal) : 0;
-      points.push_back({carried.points[i] + gap_mm * normal, normal, people.bone[i].depth, gap_mm});
-    }
-  }
+  std::vector<SubjectPoint> points = PointsOnSkull(people, carried, feet, input);
   if (points.size() * kFewest < people.bone.size()) {
-    throw InputError(fmt::format(
-        "interp: population finds bone at {} of {} points of people's facial bone; the skull lacks "
-        "most of its face, or its landmarks are wrong. Check the landmarks, or choose another "
-        "scheme, for example barycentric",
+    return Fault(fmt::format(
+        "bone is found at {} of {} points of people's facial bone; the skull lacks most of its "
+        "face, or its landmarks are wrong",
         points.size(), people.bone.size()));
   }
-  return points;
+  return {std::move(points), {}};
 }
 
 }  // namespace semblance::interp

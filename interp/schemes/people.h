@@ -52,12 +52,17 @@ struct SubjectPoint {
   double gap_mm = 0;
 };
 
+// People's points on a subject, or why there are none.
+struct CarriedBone {
+  std::vector<SubjectPoint> points;
+  std::string fault;  // empty if there are points
+};
+
 // Carries the mean bone onto input.bone (input.skull without it): by a thin plate through the sites
 // of the dowels, then along smooth displacements towards the closest bone that faces the same way.
-// Points with no such bone within a few mm are left out. Throws InputError if fewer than six dowels
-// stand at sites of the people, if these lie in a plane, or if less than a quarter of the points
-// find bone.
-std::vector<SubjectPoint> CarryToSubject(const People& people, const DepthInput& input,
-                                         const RunContext& run);
+// Points with no such bone within a few mm are left out. The fault is that fewer than six dowels
+// stand at sites of the people, that these lie in a plane, or that less than a quarter of the
+// points find bone.
+CarriedBone CarryToSubject(const People& people, const DepthInput& input, const RunContext& run);
 
 }  // namespace semblance::interp

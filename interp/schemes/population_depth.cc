@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interp/schemes/population_depth.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "interp/dowels/dowel_samples.h"
@@ -23,33 +26,51 @@ struct Expected {
   double nearest_mm = kNaN;  // to the nearest of the points
 };
 
-// The Gaussian mean of the points around a place. Points that face away hardly count.
-Expected ExpectedAt(const std::vector<SubjectPoint>& points, const Vec3& place,
-                    const Vec3& normal) {
-  constexpr double kWidth_mm = 6;  // about the distance of neighbouring points
-  constexpr double kAway = 0.05;   // keeps the sum of weights above 0 on the far side of thin bone
-  Expected at{place, {0, 0, 0}, 0, std::numeric_limits<double>::infinity()};
-  for (const SubjectPoint& point : points) {
-    at.nearest_mm = std::min(at.nearest_mm, (point.on_skull - place).norm());
+// The expectation all over the skull, from people's points on it.
+class Expectation {
+ public:
+  explicit Expectation(std::vector<SubjectPoint> points)
+      : points_(std::move(points)), places_(3, std::ssize(points_)) {
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      places_.col(static_cast<Eigen::Index>(k)) = points_[k].on_skull;
+    }
   }
-  double weights = 0;
-  for (const SubjectPoint& point : points) {
-    // The nearest point has the weight 1 at any distance, so that no sum vanishes.
-    const double beyond = (point.on_skull - place).squaredNorm() - at.nearest_mm * at.nearest_mm;
-    const double weight =
-        std::exp(-beyond / (2 * kWidth_mm * kWidth_mm)) * std::max(kAway, point.normal.dot(normal));
-    at.depth.mean += weight * point.depth.mean;
-    at.depth.sd += weight * point.depth.sd;
-    at.depth.loading += weight * point.depth.loading;
-    at.gap_mm += weight * point.gap_mm;
-    weights += weight;
+
+  // The Gaussian mean of the points around a place. Points that face away hardly count.
+  Expected At(const Vec3& place, const Vec3& normal) const {
+    constexpr double kWidth_mm = 6;  // about the distance of neighbouring points
+    constexpr double kAway = 0.05;  // keeps the sum of weights above 0 on the far side of thin bone
+    constexpr double kWidths = 6;   // weights beyond are below 1e-7 of the nearest point's
+    const Eigen::ArrayXd squared = (places_.colwise() - place).colwise().squaredNorm();
+    const double nearest = squared.minCoeff();
+    Expected at{place, {0, 0, 0}, 0, std::sqrt(nearest)};
+    double weights = 0;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+      // The nearest point has the weight 1 at any distance, so that no sum vanishes.
+      const double beyond = squared[static_cast<Eigen::Index>(k)] - nearest;
+      if (beyond > kWidths * kWidths * kWidth_mm * kWidth_mm) {
+        continue;
+      }
+      const SubjectPoint& point = points_[k];
+      const double weight = std::exp(-beyond / (2 * kWidth_mm * kWidth_mm)) *
+                            std::max(kAway, point.normal.dot(normal));
+      at.depth.mean += weight * point.depth.mean;
+      at.depth.sd += weight * point.depth.sd;
+      at.depth.loading += weight * point.depth.loading;
+      at.gap_mm += weight * point.gap_mm;
+      weights += weight;
+    }
+    at.depth.mean /= weights;
+    at.depth.sd /= weights;
+    at.depth.loading /= weights;
+    at.gap_mm /= weights;
+    return at;
   }
-  at.depth.mean /= weights;
-  at.depth.sd /= weights;
-  at.depth.loading /= weights;
-  at.gap_mm /= weights;
-  return at;
-}
+
+ private:
+  std::vector<SubjectPoint> points_;
+  Eigen::Matrix3Xd places_;  // of the points, so that all distances are one expression
+};
 
 double CovarianceBetween(const Expected& a, const Expected& b, double range_mm) {
   const double la = a.depth.loading, lb = b.depth.loading;
@@ -67,13 +88,12 @@ struct KnownDepth {
 };
 
 std::vector<KnownDepth> KnownDepths(const PopulationDepth& options, const People& people,
-                                    const std::vector<SubjectPoint>& points,
-                                    const DepthInput& input) {
+                                    const Expectation& expectation, const DepthInput& input) {
   std::vector<Dowel> dowels(input.dowels.begin(), input.dowels.end());
   std::ranges::sort(dowels, {}, &Dowel::site);  // so that their order does not matter
   std::vector<KnownDepth> known;
   for (const Dowel& dowel : dowels) {
-    Expected at = ExpectedAt(points, dowel.base, dowel.direction);
+    Expected at = expectation.At(dowel.base, dowel.direction);
     if (const auto site = people.sites.find(dowel.site); site != people.sites.end()) {
       at.depth = site->second.depth;
     } else if (at.nearest_mm > options.reach_mm) {
@@ -144,14 +164,21 @@ DepthField InterpolateDepth(const PopulationDepth& options, const DepthInput& in
   CheckDepthInput(input);
   CheckSurface(PopulationDepth::kName, input.skull);
   const People& people = CarriedPeople();
-  const std::vector<SubjectPoint> points = CarryToSubject(people, input, run);
+  CarriedBone carried = CarryToSubject(people, input, run);
+  DepthField beyond =
+      InterpolateDepth(RadialBasis{.max_angle_deg = options.max_angle_deg}, input, run);
+  if (!carried.fault.empty()) {
+    beyond.shares = {{std::string(RadialBasis::kName), 1}};
+    beyond.notes.push_back(
+        fmt::format("interp: population: {}; the depths are those of radial_basis", carried.fault));
+    return beyond;
+  }
+  const Expectation expectation(std::move(carried.points));
   const std::vector<DepthSample> samples = DepthSamples(input.dowels);
   const DepthLimits limits(samples, false);
-  const DepthField beyond =
-      InterpolateDepth(RadialBasis{.max_angle_deg = options.max_angle_deg}, input, run);
-  const Conditioned person(KnownDepths(options, people, points, input), options.range_mm);
+  const Conditioned person(KnownDepths(options, people, expectation, input), options.range_mm);
   return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
-    const Expected place = ExpectedAt(points, input.skull.points[i], input.normals[i]);
+    const Expected place = expectation.At(input.skull.points[i], input.normals[i]);
     const double share = ShareOfFallback(place.nearest_mm, options.reach_mm);
     const DepthValue own = person.At(place);
     return DepthValue{

@@ -47,8 +47,9 @@ void Fields(Visitor& visit, PopulationDepth& o) {
 // (docs/explanation/mathematics-depth.md). Depth counts from the bone; where the skull was filled,
 // the gap is taken off, down to 1 mm, so that tissue over the temporal fossa has its own depth.
 // sd_mm is the process's where people reach, and NaN beyond. Depths are above a tenth of the
-// smallest dowel's and may leave the dowels' range. kNotFacing as in AssignWhereFacing. Throws
-// InputError as CheckDepthInput and CarryToSubject do, or if the skull has no triangle.
+// smallest dowel's and may leave the dowels' range. If CarryToSubject finds a fault, the field is
+// radial_basis's, with a note and a share. kNotFacing as in AssignWhereFacing. Throws InputError as
+// CheckDepthInput does, or if the skull has no triangle.
 DepthField InterpolateDepth(const PopulationDepth& options, const DepthInput& input,
                             const RunContext& run);
 
