@@ -133,8 +133,8 @@ tidy: setup
 	  xargs -r -n 1 -P $$(nproc) clang-tidy -p build-tidy --quiet --extra-arg=-Wno-unknown-warning-option
 
 # The program accepts every configuration and study, with all files that they name. The real heads and the results of the demos are not part
-# of the project, and published.yaml and people.yaml name no subject: their inputs are not opened.
-configs: PARTS = configs/published.yaml configs/people.yaml
+# of the project, and published.yaml names no subject: their inputs are not opened.
+configs: PARTS = configs/published.yaml
 configs: build
 	@$(PROGRAM) check $(filter-out $(PARTS),$(wildcard configs/*.yaml)) configs/fit/*.yaml configs/studies/*.yaml
 	@$(PROGRAM) check --without-inputs $(PARTS) configs/heads/*.yaml configs/demo_phantom/*.yaml configs/population/*.yaml

@@ -151,7 +151,7 @@ std::vector<std::string> CheckLandmarks(const SubjectData& data, const MeshQuery
 
 // The source of the expected depths, if the scheme needs them.
 std::optional<TissueOptions> ExpectedTissue(const Experiment& experiment) {
-  if (!NeedsExpected(experiment.interp)) {
+  if (!NeedsExpected(WayToDepth(experiment))) {
     return std::nullopt;
   }
   TissueOptions table = experiment.tissue;

@@ -69,6 +69,15 @@ void CheckBust(const Experiment& experiment, std::vector<OptionFault>& faults) {
   }
 }
 
+bool HasSteps(const SchedulePlan& plan) {
+  return std::holds_alternative<ListedPlan>(plan) || std::holds_alternative<CoarseToFinePlan>(plan);
+}
+
+// `face: joint` runs the steps of a schedule, and its levels meet the data with the whole surface.
+bool JointRuns(const SchedulePlan& plan) {
+  return HasSteps(plan) && PlanAim(plan) == FitAim::kSurface;
+}
+
 }  // namespace
 
 FaceSource WayToFace(const Experiment& experiment) {
@@ -78,7 +87,24 @@ FaceSource WayToFace(const Experiment& experiment) {
   const bool fits = std::holds_alternative<IctPrior>(experiment.prior)
                         ? std::holds_alternative<IctTemplate>(experiment.face_template)
                         : !std::holds_alternative<NoPrior>(experiment.prior);
-  return fits ? FaceSource(PriorThenFit{}) : FaceSource(FittedTemplate{});
+  if (!fits) {
+    return FittedTemplate{};
+  }
+  return JointRuns(experiment.fit.plan) ? FaceSource(JointFace{}) : FaceSource(PriorThenFit{});
+}
+
+DepthScheme WayToDepth(const Experiment& experiment) {
+  return std::visit(
+      [&]<class Choice>(const Choice& choice) -> DepthScheme {
+        if constexpr (std::is_same_v<Choice, DefaultDepth>) {
+          return std::holds_alternative<PhantomOptions>(experiment.subject)
+                     ? DepthScheme(Barycentric{})
+                     : DepthScheme(PopulationDepth{});
+        } else {
+          return choice;
+        }
+      },
+      experiment.interp);
 }
 
 namespace {
@@ -101,7 +127,7 @@ std::vector<std::string> TableMeans(const DepthScheme& scheme) {
 
 // The table's mean adds no information to the table's own depths.
 void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& faults) {
-  for (const std::string& option : TableMeans(experiment.interp)) {
+  for (const std::string& option : TableMeans(WayToDepth(experiment))) {
     if (experiment.tissue.depths == DepthSource::kTable) {
       faults.push_back({option,
                         "the depths are the table's own (tissue.depths: table), and its mean "
@@ -163,20 +189,18 @@ void CheckAutoPlan(const Experiment& experiment, std::vector<OptionFault>& fault
   }
 }
 
-// `face: joint` runs the steps of a schedule, and its levels meet the data with the whole surface.
 void CheckJointPlan(const Experiment& experiment, std::vector<OptionFault>& faults) {
   if (!std::holds_alternative<JointFace>(experiment.face)) {
     return;
   }
-  const SchedulePlan& plan = experiment.fit.plan;
-  if (!std::holds_alternative<ListedPlan>(plan) &&
-      !std::holds_alternative<CoarseToFinePlan>(plan)) {
+  if (!HasSteps(experiment.fit.plan)) {
     faults.push_back({"fit.plan",
                       "`face: joint` runs the steps of a schedule once; take `listed` or "
-                      "`coarse_to_fine`"});
-  } else if (PlanAim(plan) != FitAim::kSurface) {
+                      "`coarse_to_fine`, or `face: prior_then_fit`"});
+  } else if (PlanAim(experiment.fit.plan) != FitAim::kSurface) {
     faults.push_back({"fit.plan.aim",
-                      "`face: joint` fits the whole surface; leave it out, or take another face"});
+                      "`face: joint` fits the whole surface; leave it out, or take `face: "
+                      "prior_then_fit`"});
   }
 }
 
@@ -319,6 +343,24 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   return {{"template", error.what()}};
 }
 
+namespace {
+
+// The option of the face that replaces an unused one, in words.
+std::string_view Replacement(std::string_view path, const FaceSource& face) {
+  const bool joint = std::holds_alternative<JointFace>(face);
+  if (path == "seeds.method" && joint) {
+    return "; face.seed_method replaces it";
+  }
+  if (path == "seeds.weight" && joint) {
+    return "; face.estimate.surface_worth replaces it";
+  }
+  return path == "seeds.weight" && std::holds_alternative<PriorThenFit>(face)
+             ? "; face.seed_weight of prior_then_fit replaces it"
+             : "";
+}
+
+}  // namespace
+
 std::vector<std::string> UnusedOptions(const Experiment& experiment) {
   const FaceSource face = WayToFace(experiment);
   if (std::holds_alternative<FittedTemplate>(face)) {
@@ -335,22 +377,17 @@ std::vector<std::string> UnusedOptions(const Experiment& experiment) {
     });
   } else if (std::holds_alternative<JointFace>(face)) {
     std::erase_if(paths, [](const std::string& path) {
-      return (path.starts_with("seeds") && path != "seeds.weight") || path == "rounds" ||
-             path.starts_with("fit.plan");
+      return (path.starts_with("seeds") && path != "seeds.weight" && path != "seeds.method") ||
+             path == "rounds" || path.starts_with("fit.plan");
     });
   }
   std::vector<std::string> notes;
   if (std::holds_alternative<PriorThenFit>(face)) {
     notes = UnusedFitOptions(experiment);
   }
-  const std::string instead = std::holds_alternative<PriorThenFit>(face)
-                                  ? "; face.seed_weight of prior_then_fit replaces it"
-                              : std::holds_alternative<JointFace>(face)
-                                  ? "; face.estimate.surface_worth replaces it"
-                                  : "";
   for (const std::string& path : paths) {
     notes.push_back(fmt::format("{}: `face: {}` does not use it{}", path, NameOf(face),
-                                path == "seeds.weight" ? instead : ""));
+                                Replacement(path, face)));
   }
   return notes;
 }

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -252,6 +253,17 @@ void Fields(Visitor& visit, CaseRecord& o) {
   visit(FieldInfo{.name = "notes", .doc = "remarks on the case"}, o.notes);
 }
 
+// population for a person's skull, barycentric for a phantom, whose tissue is nobody's.
+struct DefaultDepth {
+  static constexpr std::string_view kName = "default";
+};
+template <class Visitor>
+void Fields(Visitor&, DefaultDepth&) {}
+
+template <class... Scheme>
+std::variant<DefaultDepth, Scheme...> WithDefault(const std::variant<Scheme...>&);
+using DepthChoice = decltype(WithDefault(std::declval<DepthScheme>()));
+
 struct Experiment {
   std::string title = "untitled";
   CaseRecord record;
@@ -260,7 +272,7 @@ struct Experiment {
   TissueOptions tissue;
   ExtraSites sites;
   std::filesystem::path network;
-  DepthScheme interp;
+  DepthChoice interp;
   OutsideRule outside;
   SkullFill fill;
   ImplicitFaceOptions implicit;
@@ -303,7 +315,9 @@ void Fields(Visitor& visit, Experiment& o) {
   visit(FieldInfo{.name = "network",
                   .doc = "YAML file of the dowel network: which dowels share an area"},
         o.network);
-  visit(FieldInfo{.name = "interp", .doc = "how depth is interpolated between the dowels"},
+  visit(FieldInfo{.name = "interp",
+                  .doc = "how depth is interpolated between the dowels; default: population for a "
+                         "person's skull, barycentric for a phantom"},
         o.interp);
   visit(FieldInfo{.name = "outside",
                   .doc = "depth of bone outside the network or turned away from it"},
@@ -328,8 +342,9 @@ void Fields(Visitor& visit, Experiment& o) {
                          "then the H-spline of its mean; ict is the one of `template: ict`"},
         o.prior);
   visit(FieldInfo{.name = "face",
-                  .doc = "the method; auto: prior_then_fit if there is a prior of the "
-                         "template, else fit; placed: the template, brought to the dowels; "
+                  .doc = "the method; auto: joint if there is a prior of the "
+                         "template (prior_then_fit for a plan without steps), else fit; placed: "
+                         "the template, brought to the dowels; "
                          "thin_plate: the template, bent to their tips; fit: the template, fitted "
                          "to tips and implicit face level by level; prior: the most likely face of "
                          "the prior, given tips and implicit face; prior_then_fit: that face as "
@@ -395,6 +410,9 @@ void Fields(Visitor& visit, Experiment& o) {
 
 // experiment.face, with `auto` resolved. Never AutoFace.
 FaceSource WayToFace(const Experiment& experiment);
+
+// experiment.interp, with `default` resolved.
+DepthScheme WayToDepth(const Experiment& experiment);
 
 // Options that are valid each by itself but not together, e.g. a step of the schedule at a level
 // that the generic face does not have. Reading a configuration reports them with the other faults.

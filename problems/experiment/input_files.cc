@@ -157,7 +157,7 @@ bool NamesAFile(const Experiment& experiment) {
 
 std::vector<NamedFile> NamedInputs(const Experiment& experiment) {
   std::vector<NamedFile> files = NamedFiles(experiment);
-  if (TissueTableFiles(experiment.tissue).empty() && !NeedsExpected(experiment.interp)) {
+  if (TissueTableFiles(experiment.tissue).empty() && !NeedsExpected(WayToDepth(experiment))) {
     std::erase_if(files,
                   [](const NamedFile& named) { return named.option.starts_with("tissue."); });
   }

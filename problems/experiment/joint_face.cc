@@ -168,10 +168,18 @@ class JointFitter {
     }
   }
 
+  SeedSource Seeds() const {
+    SeedSource seeds = in_.experiment.seeds;
+    if (auto* const patches = std::get_if<SeedOptions>(&seeds)) {
+      patches->method = options_.seed_method;
+    }
+    return seeds;
+  }
+
   void Seed() {
     data_.seeds.clear();
     seeding_ = implicit_ ? MakeSeeds(surface_, implicit_->query(), in_,
-                                     TemplateMasks(made_.placed.face), in_.experiment.seeds)
+                                     TemplateMasks(made_.placed.face), Seeds())
                          : SeedResult{.points = {}, .masked = 0, .missed = 0, .folded = 0};
     std::erase_if(seeding_.points, [&](const FitPoint& seed) { return !IsTrusted(seed.position); });
     // A seed stands for the area of its patch: patches round the mouth are small.

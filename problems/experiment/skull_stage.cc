@@ -224,8 +224,10 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
                    !std::holds_alternative<NoFill>(e.fill)};
   stage.depth = step("interpolate depth", [&] {
     return ApplyOutsideRule(e.outside, stage.Input(),
-                            InterpolateDepth(e.interp, stage.Input(), context), context);
+                            InterpolateDepth(WayToDepth(e), stage.Input(), context), context);
   });
+  stage.subject.notes.insert(stage.subject.notes.end(), stage.depth.notes.begin(),
+                             stage.depth.notes.end());
   NoteEnds(stage.depth, stage.subject.notes);
   FillOpenDowels(stage.shell, stage.depth, stage.subject);
   return stage;
@@ -234,7 +236,7 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
 // The key of the depth. It includes the generic face if a dowel is placed by its (u,v).
 std::string MakeDepthKey(const Experiment& e) {
   std::string key = StageKey("depth", e.subject, e.landmarks, e.tissue, e.sites, e.network,
-                             e.interp, e.outside, e.fill);
+                             WayToDepth(e), e.outside, e.fill);
   return std::ranges::any_of(e.sites, [](const auto& entry) { return entry.second.uv.has_value(); })
              ? key + StageKey("placed on", e.face_template, e.placement)
              : key;

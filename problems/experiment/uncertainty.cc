@@ -59,12 +59,13 @@ std::int32_t NearestCorner(const TriMesh& shell, const MeshPoint& at) {
   });
 }
 
-// True if the scheme's deviations cover the dowels' errors alone. The deviations of the two other
-// schemes also cover the error between dowels, which kriging states here already.
+// True if the scheme's deviations cover the dowels' errors alone. The deviations of the three
+// other schemes also cover the error between dowels, which kriging states here already.
 bool StatesDowelsAlone(const Experiment& experiment) {
-  return !std::holds_alternative<SurfaceMatern>(experiment.interp) &&
-         !std::holds_alternative<AutoScheme>(experiment.interp) &&
-         !std::holds_alternative<PopulationDepth>(experiment.interp);
+  const DepthScheme scheme = WayToDepth(experiment);
+  return !std::holds_alternative<SurfaceMatern>(scheme) &&
+         !std::holds_alternative<AutoScheme>(scheme) &&
+         !std::holds_alternative<PopulationDepth>(scheme);
 }
 
 std::vector<DepthBehind> DepthsBehind(const Experiment& experiment, const FitTarget& target,

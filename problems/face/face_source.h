@@ -6,13 +6,15 @@
 #include <string_view>
 #include <variant>
 
+#include "fitting/problem/seeding.h"
 #include "problems/face/prior_observations.h"
 #include "problems/face/residual_field.h"
 #include "surfaces/base/fields.h"
 
 namespace semblance::problems {
 
-// prior_then_fit if there is a prior of the template, else fit.
+// If there is a prior of the template, joint, or prior_then_fit for a plan that joint does not run;
+// else fit.
 struct AutoFace {
   static constexpr std::string_view kName = "auto";
 };
@@ -143,11 +145,17 @@ void Fields(Visitor& visit, PriorThenFit& o) {
 // vertices, coefficients of the prior and pose together.
 struct JointFace {
   static constexpr std::string_view kName = "joint";
+  SeedMethod seed_method = SeedMethod::kClosest;
   ResidualFieldOptions residual;
   PriorUse use;
 };
 template <class Visitor>
 void Fields(Visitor& visit, JointFace& o) {
+  visit(FieldInfo{.name = "seed_method",
+                  .doc = "how seeds are found, in place of seeds.method; closest: nearest point; "
+                         "ray: along a smoothed normal, which spreads seeds evenly, but the face "
+                         "starts too near to the implicit face to need that"},
+        o.seed_method);
   visit(FieldInfo{.name = "residual",
                   .doc = "how far, and over what distance, the face may deviate from the prior"},
         o.residual);

@@ -252,11 +252,15 @@ namespace {
 
 TemplateFace Load(const FormulaTemplate& source) { return MakeTemplateFace(source); }
 TemplateFace Load(const FileTemplate& source) { return ReadTemplate(source); }
-TemplateFace Load(const IctTemplate&) {
-  static const TemplateFace kFace = ParseTemplate(
-      {"the ICT face", "the ICT face's sites", "the ICT face's features"},
-      {std::string(IctSurface()), std::string(IctSites()), std::string(IctFeatures())});
-  return kFace;
+TemplateFace ParseIct(std::string_view surface) {
+  return ParseTemplate({"the ICT face", "the ICT face's sites", "the ICT face's features"},
+                       {std::string(surface), std::string(IctSites()), std::string(IctFeatures())});
+}
+
+TemplateFace Load(const IctTemplate& source) {
+  static const TemplateFace kModel = ParseIct(IctSurface());
+  static const TemplateFace kPeople = ParseIct(PeopleSurface());
+  return source.mean == IctMean::kModel ? kModel : kPeople;
 }
 
 }  // namespace

@@ -47,12 +47,22 @@ FileTemplate WriteTemplate(const std::filesystem::path& folder, const TemplateFa
 // levels, a radius that is not positive.
 TemplateFace ReadTemplate(const FileTemplate& files);
 
-// The mean of the ICT-FaceKit model, from configs/faces/ict.
+enum class IctMean { kPeople, kModel };
+constexpr auto EnumNames(IctMean) { return std::to_array<std::string_view>({"people", "model"}); }
+
+// The mean of the ICT-FaceKit model, from configs/faces/ict, without its bias.
 struct IctTemplate {
   static constexpr std::string_view kName = "ict";
+  IctMean mean = IctMean::kPeople;
 };
 template <class Visitor>
-void Fields(Visitor&, IctTemplate&) {}
+void Fields(Visitor& visit, IctTemplate& o) {
+  visit(FieldInfo{.name = "mean",
+                  .doc = "people: corrected at the mean head of 54 people (configs/faces/people), "
+                         "whose cheek bones, temples and lower lip are less full; model: the "
+                         "model's own"},
+        o.mean);
+}
 
 using TemplateSource = std::variant<FormulaTemplate, IctTemplate, FileTemplate>;
 

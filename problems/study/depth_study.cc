@@ -41,7 +41,7 @@ std::vector<std::pair<std::string, CrossValidation>> LeaveOut(const Experiment& 
   for (const auto& [kind, folds] :
        KindsOfFolds(experiment.cross_validation, stage.dowels_on_shell)) {
     left_out.emplace_back(
-        kind, CrossValidate(experiment.interp, experiment.outside, stage.Input(), folds, context));
+        kind, CrossValidate(WayToDepth(experiment), experiment.outside, stage.Input(), folds, context));
   }
   return left_out;
 }

@@ -52,8 +52,9 @@ std::optional<BustModel> Load(const NoBust&, const TemplateSource&, const RunCon
 
 std::optional<BustModel> Load(const IctBust&, const TemplateSource& face_template,
                               const RunContext&) {
+  // The head was made around the model's own mean.
   BustModel bust = MakeModel(WholeHeadFromJson(IctHead(), "the ICT head"),
-                             LoadTemplate(IctTemplate{}), "the ICT head");
+                             LoadTemplate(IctTemplate{.mean = IctMean::kModel}), "the ICT head");
   if (!std::holds_alternative<IctTemplate>(face_template)) {
     bust.rest.reset();
   }

@@ -33,7 +33,6 @@ TEST(Experiment, TheTermOfAPriorNeedsAFaceOfThePrior) {
   const std::string terms = "fit: {terms: [points, prior_shape]}\n";
   EXPECT_THAT(Faults(terms + "face: fit\n"), HasSubstr("1:14: fit.terms: the term 'prior_shape'"));
   EXPECT_NO_THROW(ReadConfigText<Experiment>(terms + "face: prior_then_fit\n", "a.yaml"));
-  EXPECT_NO_THROW(ReadConfigText<Experiment>(terms, "a.yaml"));  // to which auto resolves
 }
 
 // A prior is used if it is one of the template.
@@ -42,10 +41,12 @@ TEST(Experiment, TheWayToTheFaceFollowsTemplateAndPrior) {
     return std::visit([](const auto& face) { return face.kName; },
                       WayToFace(ReadConfigText<Experiment>(text, "a.yaml")));
   };
-  EXPECT_EQ(way(""), "prior_then_fit");
+  EXPECT_EQ(way(""), "joint");
   EXPECT_EQ(way("template: formula\n"), "fit");
   EXPECT_EQ(way("prior: none\n"), "fit");
-  EXPECT_EQ(way("template: formula\nprior: {type: hspline, modes: m.json}\n"), "prior_then_fit");
+  EXPECT_EQ(way("template: formula\nprior: {type: hspline, modes: m.json}\n"), "joint");
+  EXPECT_EQ(way("fit: {plan: {type: adaptive, finest: 3}}\n"), "prior_then_fit");
+  EXPECT_EQ(way("fit: {plan: {type: listed, aim: level}}\n"), "prior_then_fit");
   EXPECT_EQ(way("face: placed\n"), "placed");
   EXPECT_THAT(Faults("template: formula\nface: prior\n"),
               HasSubstr("a.yaml:2:7: face: it uses the prior 'ict'"));
@@ -55,7 +56,7 @@ TEST(Experiment, TheWayToTheFaceFollowsTemplateAndPrior) {
 
 TEST(Experiment, UncertaintyOptionsThatTheFaceDoesNotUseAreFaultsAtTheirLine) {
   EXPECT_THAT(Faults("uncertainty: {dowel_sd_mm: 3}\n"),
-              HasSubstr("a.yaml:1:28: uncertainty.dowel_sd_mm: `face: prior_then_fit` does not"));
+              HasSubstr("a.yaml:1:28: uncertainty.dowel_sd_mm: `face: joint` does not"));
   EXPECT_THAT(Faults("uncertainty: {own: 0.5, shared: 0.2, implicit_sd_mm: 1}\n"),
               AllOf(HasSubstr("face.table_depths.own"), HasSubstr("face.table_depths.shared"),
                     HasSubstr("face.implicit_spread")));
@@ -73,20 +74,26 @@ TEST(Experiment, UnusedOptionsOfSeedsAndFitAreNoted) {
     return UnusedOptions(ReadConfigText<Experiment>(text, "a.yaml"));
   };
   const std::string set =
-      "seeds: {weight: 0.5, level: 1}\nfirst_fit: []\nrounds: 2\n"
+      "seeds: {weight: 0.5, level: 1, method: closest}\nfirst_fit: []\nrounds: 2\n"
       "fit: {solver: fastest, plan: {schedule: [{level: 0}]}, terms: [points]}\n";
   EXPECT_THAT(unused("face: placed\n"), ::testing::IsEmpty());
   EXPECT_THAT(unused("face: fit\n" + set), ::testing::IsEmpty());
   EXPECT_THAT(
       unused("face: thin_plate\n" + set),
-      ::testing::UnorderedElementsAre(HasSubstr("seeds.weight: `face: thin_plate` does not use it"),
-                                      HasSubstr("seeds.level: "), HasSubstr("first_fit: "),
-                                      HasSubstr("rounds: "), HasSubstr("fit.solver: "),
-                                      HasSubstr("fit.plan.schedule: "), HasSubstr("fit.terms: ")));
-  EXPECT_THAT(unused(set), ::testing::UnorderedElementsAre(
-                               HasSubstr("seeds.weight: `face: prior_then_fit` does not use "
-                                         "it; face.seed_weight"),
-                               HasSubstr("first_fit: ")));
+      ::testing::UnorderedElementsAre(
+          HasSubstr("seeds.weight: `face: thin_plate` does not use it"), HasSubstr("seeds.level: "),
+          HasSubstr("seeds.method: "), HasSubstr("first_fit: "), HasSubstr("rounds: "),
+          HasSubstr("fit.solver: "), HasSubstr("fit.plan.schedule: "), HasSubstr("fit.terms: ")));
+  EXPECT_THAT(
+      unused("face: prior_then_fit\n" + set),
+      ::testing::UnorderedElementsAre(HasSubstr("seeds.weight: `face: prior_then_fit` does not use "
+                                                "it; face.seed_weight"),
+                                      HasSubstr("first_fit: ")));
+  EXPECT_THAT(unused(set),
+              ::testing::UnorderedElementsAre(
+                  HasSubstr("seeds.weight: `face: joint` does not use it; face.estimate"),
+                  HasSubstr("seeds.method: `face: joint` does not use it; face.seed_method"),
+                  HasSubstr("first_fit: "), HasSubstr("fit.solver: "), HasSubstr("fit.terms: ")));
 }
 
 TEST(Experiment, AWidthWithoutALossIsNoted) {
@@ -115,21 +122,16 @@ TEST(Experiment, AUsedPriorNamesItsFiles) {
 
 TEST(Experiment, TheDefaultsFitTogether) { EXPECT_THAT(FaultsBetween(Experiment{}), IsEmpty()); }
 
-// configs/people.yaml as a base changes the scheme and the generic face, and nothing of the
-// subject.
-TEST(Experiment, WhatPeopleTeachIsOneBaseAway) {
-  const testing::ScratchFolder folder;
-  const std::string configs = SEMBLANCE_SOURCE_DIR "/configs/";
-  const Experiment demo = ReadConfig<Experiment>(configs + "demo.yaml");
-  const Experiment people = ReadConfigText<Experiment>(
-      fmt::format("base: [{0}demo.yaml, {0}people.yaml]\n", configs), folder / "e.yaml");
-  EXPECT_THAT(FaultsBetween(people), IsEmpty());
-  EXPECT_EQ(StageKey("", people.subject), StageKey("", demo.subject));
-  EXPECT_EQ(StageKey("", people.tissue), StageKey("", demo.tissue));
-  EXPECT_TRUE(std::holds_alternative<PopulationDepth>(people.interp));
-  EXPECT_TRUE(std::holds_alternative<HSplinePrior>(people.prior));
-  EXPECT_TRUE(std::filesystem::exists(std::get<FileTemplate>(people.face_template).surface));
-  EXPECT_NE(StageKey("", people.face_template), StageKey("", demo.face_template));
+TEST(Experiment, PeopleGetPeoplesDepthByDefaultAndPhantomsDoNot) {
+  Experiment experiment;
+  experiment.subject = FileSubject{};
+  EXPECT_TRUE(std::holds_alternative<PopulationDepth>(WayToDepth(experiment)));
+  experiment.subject = CtSubject{};
+  EXPECT_TRUE(std::holds_alternative<PopulationDepth>(WayToDepth(experiment)));
+  experiment.subject = PhantomOptions{};
+  EXPECT_TRUE(std::holds_alternative<Barycentric>(WayToDepth(experiment)));
+  experiment.interp = Kriging{};
+  EXPECT_TRUE(std::holds_alternative<Kriging>(WayToDepth(experiment)));
 }
 
 // configs/published.yaml as a base of a subject gives the way of the thesis with the subject's

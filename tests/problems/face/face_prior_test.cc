@@ -363,22 +363,41 @@ TEST(PriorSurface, AShapeOfTheModelIsFollowedInTheTemplatesOwnParameters) {
   EXPECT_LT((features[0].center - moved).norm(), 1);
 }
 
-// The program contains the files of configs/faces/ict.
-TEST(IctFace, IsThatOfTheFiles) {
-  const fs::path folder = SEMBLANCE_SOURCE_DIR "/configs/faces/ict";
-  const TemplateFace carried = LoadTemplate(IctTemplate{}),
-                     read = LoadTemplate(FileTemplate{.surface = folder / "head.hspline.json",
-                                                      .sites = folder / "sites.csv",
-                                                      .features = folder / "features.json"});
+fs::path IctFolder() { return SEMBLANCE_SOURCE_DIR "/configs/faces/ict"; }
+
+void ExpectFromFile(const TemplateFace& carried, const fs::path& surface) {
+  const TemplateFace read = LoadTemplate(FileTemplate{.surface = surface,
+                                                      .sites = IctFolder() / "sites.csv",
+                                                      .features = IctFolder() / "features.json"});
   EXPECT_EQ(carried.surface.Net(0).vertices, read.surface.Net(0).vertices);
   EXPECT_EQ(carried.surface.Offsets(), read.surface.Offsets());
   EXPECT_EQ(carried.site_uv, read.site_uv);
   EXPECT_EQ(FeatureVertices(carried), FeatureVertices(read));
-  const FacePrior prior = LoadPrior(IctPrior{.count = 3}, carried),
-                  from_file = LoadPrior(HSplinePrior{folder / "modes.json", 3}, read);
+}
+
+// The program contains the files of configs/faces/ict and configs/faces/people.
+TEST(IctFace, IsThatOfTheFiles) {
+  const TemplateFace model = LoadTemplate(IctTemplate{.mean = IctMean::kModel});
+  ExpectFromFile(model, IctFolder() / "head.hspline.json");
+  ExpectFromFile(LoadTemplate(IctTemplate{}), IctFolder() / "../people/head.hspline.json");
+  const FacePrior prior = LoadPrior(IctPrior{.count = 3}, model),
+                  from_file = LoadPrior(HSplinePrior{IctFolder() / "modes.json", 3}, model);
   EXPECT_EQ(prior.model.Modes(), 3);
   EXPECT_EQ(prior.model.modes, from_file.model.modes);
   EXPECT_EQ(prior.model.mean.points, from_file.model.mean.points);
+}
+
+// The correction is small, and does not move the sites by more than a few mm.
+TEST(IctFace, PeoplesMeanIsCloseToTheModels) {
+  const TemplateFace model = LoadTemplate(IctTemplate{.mean = IctMean::kModel}),
+                     people = LoadTemplate(IctTemplate{});
+  double largest_mm = 0;
+  for (const auto& [site, uv] : model.site_uv) {
+    const double moved_mm = (people.surface.Point(uv) - model.surface.Point(uv)).norm();
+    EXPECT_LT(moved_mm, 4) << site;
+    largest_mm = std::max(largest_mm, moved_mm);
+  }
+  EXPECT_GT(largest_mm, 0.3);
 }
 
 TEST(HSplinePrior, ModesOnTheTemplateMoveItAsTheMeshsModesDo) {

@@ -45,7 +45,7 @@ BustModel SmallBust() {
   BustModel model{.name = "small",
                   .mesh = WholeHeadMesh(head, 112, 84),
                   .eyeballs = head.eyeballs,
-                  .rest = LoadTemplate(IctTemplate{}),
+                  .rest = LoadTemplate(IctTemplate{.mean = IctMean::kModel}),
                   .sites = {},
                   .obj = std::nullopt};
   for (const auto& [code, uv] : model.rest->site_uv) {
@@ -78,7 +78,9 @@ Bust Pose(const BustModel& model, const HSplineSurface& face, const TriMesh& ove
           int threads = 2) {
   RunContext context;
   context.threads = threads;
-  return PoseBust({model, face, LoadTemplate(IctTemplate{}).site_uv, over_skull}, context);
+  return PoseBust(
+      {model, face, LoadTemplate(IctTemplate{.mean = IctMean::kModel}).site_uv, over_skull},
+      context);
 }
 
 double LargestGap(const TriMesh& mesh, const std::vector<Vec3>& expected) {
@@ -174,7 +176,7 @@ TEST(PoseBust, AMeshWithLandmarksFollowsTheFaceToo) {
   EXPECT_LT(bust.face_rms_mm, 0.6);
   EXPECT_TRUE(bust.eyes.empty());
   const MeshQuery query(bust.skin);
-  for (const auto& [code, uv] : LoadTemplate(IctTemplate{}).site_uv) {
+  for (const auto& [code, uv] : LoadTemplate(IctTemplate{.mean = IctMean::kModel}).site_uv) {
     EXPECT_LT(query.Closest(face.Point(uv)).distance_mm, 1.5) << code;
   }
 }
@@ -183,7 +185,7 @@ TEST(PoseBust, RefusesAModelWithTooFewSites) {
   BustModel model = SmallBust();
   model.rest.reset();
   model.sites = {{"g", {0, 0, 0}}};
-  EXPECT_THAT([&] { Pose(model, LoadTemplate(IctTemplate{}).surface); },
+  EXPECT_THAT([&] { Pose(model, LoadTemplate(IctTemplate{.mean = IctMean::kModel}).surface); },
               ThrowsMessage<InputError>(HasSubstr("shares 1 sites with the face")));
 }
 
