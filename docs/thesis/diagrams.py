@@ -306,3 +306,33 @@ def local_refinement():
     svg.circle(view(net[2, 2]), 3, RED, RED)
     svg.text((400, 486), "circles: the 5 x 5 vertices of four patches; crosses: the 7 x 7 vertices of the same four patches, halved", 12)
     return str(svg)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# A.1 to A.3: the tables of depths
+# ---------------------------------------------------------------------------------------------------------------------
+
+COLUMNS = [f"{build}_{sex}" for build in ("emaciated", "normal", "obese") for sex in ("male", "female")]
+
+
+def depth_table(rows):
+    """A table of depths in mm; the deeper, the darker. rows: (number, name, {column: mean or None})."""
+    svg = Svg(800, 66 + 22 * len(rows))
+    left, width = 250, 90
+    for k, column in enumerate(COLUMNS):
+        build, sex = column.split("_")
+        svg.text((left + width * (k + 0.5), 40), sex, 12)
+        if sex == "male":
+            svg.text((left + width * (k + 1), 20), build, 13)
+    for n, (number, name, means) in enumerate(rows):
+        top = 50 + 22 * n
+        svg.text((30, top + 16), number, 12, "end")
+        svg.text((42, top + 16), name, 12, "start")
+        for k, column in enumerate(COLUMNS):
+            mean = means[column]
+            share = 0 if mean is None else min(mean / 30, 1)
+            fill = "#" + "".join(f"{round(255 - share * (255 - to)):02x}" for to in (47, 127, 193))
+            svg.polygon([(left + width * k, top), (left + width * (k + 1), top), (left + width * (k + 1), top + 22), (left + width * k, top + 22)],
+                        fill, "#ffffff", 1.0)
+            svg.text((left + width * (k + 0.5), top + 16), "missing" if mean is None else f"{mean:.2f}", 12)
+    return str(svg)

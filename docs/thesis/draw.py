@@ -196,10 +196,19 @@ def halved(picture):
     return picture[:height, :width].reshape(height // 2, 2, width // 2, 2, 3).astype(float).mean((1, 3)).round().astype(np.uint8)
 
 
+def on_paper(sheet):
+    """A sheet of the program with one colour behind all views. A view's background has one colour per row, that of the row's first pixel."""
+    side = (sheet.shape[1] - 2 * 24 - 2 * 16) // 3
+    for left in (24, 24 + side + 16, 24 + 2 * (side + 16)):
+        view = sheet[24:-24, left:left + side]
+        view[(view == view[:, :1]).all(2)] = PAPER
+    return sheet
+
+
 def view_of_run(path, view):
     """View 0 (front), 1 (three quarters) or 2 (side) of a run's picture, at half its size. The sheet has three views with a margin of 24 pixels,
     16 apart (problems/report/pictures/pictures.h)."""
-    sheet = read_png(path).astype(np.uint8)
+    sheet = on_paper(read_png(path).astype(np.uint8))
     side = (sheet.shape[1] - 2 * 24 - 2 * 16) // 3
     left = 24 + view * (side + 16)
     return halved(sheet[24:-24, left:left + side])
@@ -210,14 +219,23 @@ def trimmed(picture, rows):
     return picture[int(rows[0] * len(picture)):int(rows[1] * len(picture))]
 
 
-def few_colours(picture):
-    """The picture as indices and a palette of at most 256 colours, as finely rounded as that permits."""
-    for step in (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32):
-        rounded = np.minimum((picture.astype(int) + step // 2) // step * step, 255)
-        palette, index = np.unique(rounded.reshape(-1, 3), axis=0, return_inverse=True)
-        if len(palette) <= 256:
-            return index.reshape(picture.shape[:2]).astype(np.uint8), palette.astype(np.uint8)
-    raise ValueError("a picture with too many colours")
+def few_colours(picture, most=256):
+    """The picture as indices and a palette of at most 256 colours. More colours are gathered around the quantiles of their brightness (k-means),
+    which keeps ramps of skin and bone smooth."""
+    colours, index, counts = np.unique(picture.reshape(-1, 3), axis=0, return_inverse=True, return_counts=True)
+    if len(colours) <= most:
+        return index.reshape(picture.shape[:2]).astype(np.uint8), colours
+    places = colours.astype(float)
+    by_light = np.argsort(places.sum(1), kind="stable")
+    palette = places[by_light[np.linspace(0, len(colours) - 1, most).astype(int)]]
+    weight = np.sqrt(counts)
+    for _ in range(8):
+        nearest = np.argmin((palette**2).sum(1) - 2 * places @ palette.T, axis=1)
+        total = np.bincount(nearest, weight, most)
+        for k in range(3):
+            sums = np.bincount(nearest, weight * places[:, k], most)
+            palette[:, k] = np.where(total > 0, sums / np.maximum(total, 1e-9), palette[:, k])
+    return nearest[index].reshape(picture.shape[:2]).astype(np.uint8), palette.round().astype(np.uint8)
 
 
 def write_png(path, picture):
