@@ -71,7 +71,7 @@ def cutting_plane():
     places = {"i": (-1.9, 0.5), "j": (1.9, -0.5), "a": (0.3, 2.4), "b": (-0.4, -2.4)}
     base = {name: bone(*at) for name, at in places.items()}
     direction = {name: outward(*at) for name, at in places.items()}
-    view = seen_from(24, 24, 74, (330, 250))
+    view = seen_from(24, 24, 74, (330, 225))
     svg = Svg(660, 400)
     for own, fill in (("a", BLUE), ("b", GREEN)):
         svg.polygon(view([base["i"], base["j"], base[own]]), fill, GREY, 1.0, 0.22)
@@ -79,7 +79,7 @@ def cutting_plane():
     along /= np.linalg.norm(along)
     step = 0.25 * (base["j"] - base["i"])
     sides = [base["i"] - step, base["j"] + step]
-    svg.polygon(view([sides[0] - 0.9 * along, sides[1] - 0.9 * along, sides[1] + 1.9 * along, sides[0] + 1.9 * along]), RED, RED, 1.2, 0.16)
+    svg.polygon(view([sides[0] - 0.5 * along, sides[1] - 0.5 * along, sides[1] + 1.9 * along, sides[0] + 1.9 * along]), RED, RED, 1.2, 0.16)
     svg.line(*view([base["i"], base["j"]]), RED, 1.4, "5 3")
     for name in places:
         tip = base[name] + 1.3 * direction[name]
@@ -172,11 +172,11 @@ def case_loops(pattern):
 def cube_cases():
     """A cube for each class, with its number and the number of patterns that it stands for."""
     classes = cube_classes()
-    svg = Svg(800, 520)
+    svg = Svg(800, 524)
     for number, members in enumerate(classes):
         pattern = min(members, key=lambda p: (bin(p).count("1"), p))
-        centre = (80 + 160 * (number % 5), 86 + 168 * (number // 5))
-        view = seen_from(28, 22, 78, centre)
+        centre = (80 + 160 * (number % 5), 82 + 164 * (number // 5))
+        view = seen_from(38, 24, 76, centre)
         places = view(CORNERS - 0.5)
         for a, b in EDGES:
             hidden = 2 in (a, b)  # the corner that lies behind
@@ -186,7 +186,7 @@ def cube_cases():
         for corner in range(8):
             svg.circle(places[corner], 5.5, INK if pattern >> corner & 1 else "#ffffff")
         svg.text((centre[0], centre[1] + 78), f"{number}: stands for {len(members)}", 12)
-    svg.text((400, 514), f"{len(classes)} cases, {sum(map(len, classes))} patterns", 13)
+    svg.text((400, 512), f"{len(classes)} cases, {sum(map(len, classes))} patterns", 13)
     return str(svg)
 
 

@@ -95,7 +95,7 @@ def table_rows(path):
 
 
 def plain_view(points, triangles, azimuth_deg, width, height, colours=draw.SKIN, flat=False):
-    centre, scale = draw.in_frame(points, width, height)
+    centre, scale = draw.in_frame(points, width, height, 0.84)
     picture = draw.Picture(width, height, centre, scale, azimuth_deg)
     picture.mesh(points, triangles, colours, flat)
     return picture.pixels()
@@ -148,7 +148,7 @@ def plane(maker):
     """The depth on a plane, as a surface over it, with the four dowels."""
     points, triangles = draw.read_mesh(maker.run("plane") / "tips.ply")
     bone, bone_triangles = shapes.plane_mesh()
-    picture = draw.Picture(640, 330, (0, -8, -4), 3.1, 28, 24)
+    picture = draw.Picture(640, 320, (0, 0, 5), 2.7, 28, 24)
     turned = lambda p: np.asarray(p, float)[:, [0, 2, 1]] * (1, 1, -1)   # the plane lies flat, and depth is up
     picture.mesh(turned(bone), np.asarray(bone_triangles), draw.BONE)
     upper = points[triangles].mean(1)[:, [0, 2]].sum(1) > 0
@@ -166,10 +166,10 @@ def skull_and_depth(maker):
     vertices, triangles = draw.read_ply(folder / "depth.ply")
     bone = draw.points_of(vertices)
     moved, part = draw.read_mesh(folder / "tips.ply")
-    centre, scale = draw.in_frame(bone, 270, 270)
+    centre, scale = draw.in_frame(bone, 270, 250, 0.84)
     views = []
     for meshes in ([(bone, triangles, draw.BONE)], [(bone, triangles, draw.BONE), (moved, part, draw.SKIN)], [(moved, part, draw.SKIN)]):
-        picture = draw.Picture(270, 270, centre, scale, 35)
+        picture = draw.Picture(270, 250, centre, scale, 35)
         for mesh in meshes:
             picture.mesh(*mesh)
         views.append(picture.pixels())
@@ -178,7 +178,7 @@ def skull_and_depth(maker):
 
 def seen_shape(points, triangles, count, width, height, elevation_deg=-62.0):
     """A surface over triangles, with the triangles drawn through it."""
-    picture = draw.Picture(width, height, (0, -18, 0), 1.05 if count < 3 else 0.9, 20, elevation_deg)
+    picture = draw.Picture(width, height, (0, -18, 0), 1.2 if count == 1 else 0.95, 0 if count > 1 else 20, elevation_deg)
     picture.mesh(points, triangles)
     flat, corners = shapes.triangle_strip(count)
     edges = np.array([pair for t in corners for pair in zip(t, t[1:] + t[:1])])
@@ -223,7 +223,7 @@ def several_triangles(maker):
     columns = []
     for decay in (3, 6, 15):
         two, three = maker.mesh(f"two-{decay}"), maker.mesh(f"three-{decay}")
-        columns.append(draw.below(seen_shape(*two, 2, 260, 220), seen_shape(*two, 2, 260, 120, -4.0), section_of_three(*three)))
+        columns.append(draw.below(seen_shape(*two, 2, 260, 200, -48.0), seen_shape(*two, 2, 260, 84, -86.0), section_of_three(*three)))
     return draw.beside(*columns)
 
 
@@ -238,12 +238,11 @@ def filled_skull(maker):
     return draw.below(*rows)
 
 
-def close_up(points, triangles, edges=True):
-    """The left cheek and orbit with the edges of the triangles."""
-    picture = draw.Picture(330, 250, (150, -165, 45), 3.4, 38)
+def close_up(points, triangles):
+    """The face with the edges of the triangles, lit triangle by triangle."""
+    picture = draw.Picture(400, 290, (132, -150, 48), 2.5, 30)
     picture.mesh(points, triangles, flat=True)
-    if edges:
-        picture.wires(points, triangles, (96, 70, 58))
+    picture.wires(points, triangles, (112, 84, 70))
     return picture.pixels()
 
 

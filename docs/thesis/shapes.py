@@ -46,7 +46,7 @@ def with_back(points, triangles, outline):
 
 
 def plane_mesh():
-    """A square in the plane y = 0 that faces -y, and its back. Its cells are halved along alternating diagonals."""
+    """A square in the plane y = 0 that faces -y, and its back. Its cells are halved along the direction of the line between the two areas."""
     side = np.linspace(-PLANE_MM / 2, PLANE_MM / 2, PLANE_CELLS + 1)
     x, z = np.meshgrid(side, side)
     points = np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])
@@ -55,7 +55,7 @@ def plane_mesh():
         for column in range(PLANE_CELLS):
             a = row * (PLANE_CELLS + 1) + column
             b, c, d = a + 1, a + PLANE_CELLS + 2, a + PLANE_CELLS + 1
-            triangles += [(a, b, c), (a, c, d)] if (row + column) % 2 else [(a, b, d), (b, c, d)]
+            triangles += [(a, b, d), (b, c, d)]
     first, last, step = 0, (PLANE_CELLS + 1)**2 - 1, PLANE_CELLS + 1
     outline = [*range(first, PLANE_CELLS), *range(PLANE_CELLS, last, step), *range(last, last - PLANE_CELLS, -1), *range(last - PLANE_CELLS, 0, -step)]
     return with_back(points, triangles, outline)

@@ -55,7 +55,8 @@ def near(found, expected, tolerance, what=""):
 
 
 # A phantom that is small enough for a test.
-SMALL = ("subject={type: phantom, rings: 20}", "implicit.resolution=30", "fit.plan.schedule=[{level: 0, fraction: 1}, {level: 1, fraction: 1}]")
+SMALL = ("subject={type: phantom, rings: 20}", "implicit.resolution=24", "template.max_level=2",
+         "fit.plan.schedule=[{level: 0, fraction: 1}, {level: 1, fraction: 1}]")
 
 
 def figure_1_1():
