@@ -86,7 +86,7 @@ def cutting_plane():
         svg.line(*view([base[name], tip]), INK if name in "ij" else GREY, 4.0 if name in "ij" else 3.0)
         svg.circle(view(base[name]), 4.5, "#ffffff")
     for name in "ij":
-        svg.text(view(base[name]) + (-4, 20), f"p{name}")
+        svg.text(view(base[name]) + (-16, 14), f"p{name}")
         svg.text(view(base[name] + 1.3 * direction[name]) + (0, -8), f"n{name}")
     middle = 0.5 * (base["i"] + base["j"])
     svg.line(*view([middle, middle + 1.5 * along]), RED, 1.6, "2 3")
@@ -292,7 +292,7 @@ def local_refinement():
     net = bumpy_net()
     refined = refine(net)
     view = seen_from(28, 38, 120, (400, 250))
-    svg = Svg(800, 500)
+    svg = Svg(800, 520)
     for side in (0, 1):  # isolines of the surface: solid at the old knots, dashed at the new ones
         for at in np.linspace(0, 2, 5):
             along = np.linspace(0, 2, 41)
@@ -304,7 +304,7 @@ def local_refinement():
     for point in view(net).reshape(-1, 2):
         svg.circle(point, 6, "none", RED, 1.6)
     svg.circle(view(net[2, 2]), 3, RED, RED)
-    svg.text((400, 486), "circles: the 5 x 5 vertices of four patches; crosses: the 7 x 7 vertices of the same four patches, halved", 12)
+    svg.text((400, 508), "circles: the 5 x 5 vertices of four patches; crosses: the 7 x 7 vertices of the same four patches, halved", 12)
     return str(svg)
 
 

@@ -178,7 +178,8 @@ def skull_and_depth(maker):
 
 def seen_shape(points, triangles, count, width, height, elevation_deg=-62.0):
     """A surface over triangles, with the triangles drawn through it."""
-    picture = draw.Picture(width, height, (0, -18, 0), 1.2 if count == 1 else 0.95, 0 if count > 1 else 20, elevation_deg)
+    picture = draw.Picture(width, height, (0, -18, 12 if count == 1 else 0), 1.1 if count == 1 else 0.95,
+                           20 if count == 1 else 0, elevation_deg)
     picture.mesh(points, triangles)
     flat, corners = shapes.triangle_strip(count)
     edges = np.array([pair for t in corners for pair in zip(t, t[1:] + t[:1])])
