@@ -76,7 +76,7 @@ def figure_2_1():
     for area in areas:
         for pair in itertools.combinations(sorted(area), 2):
             uses[pair] = uses.get(pair, 0) + 1
-    assert len(areas) == 54 and set(uses.values()) == {1, 2}
+    assert len(areas) == 54 and set(uses.values()) == {1, 2}, (len(areas), uses)
     assert 32 - len(uses) + len(areas) == 1
 
 
@@ -96,7 +96,7 @@ def figure_2_3():
     front = np.abs(vertices["y"]) < 1e-6
     expected = shapes.plane_depth(vertices["x"], vertices["z"])[front]
     found = vertices["scalar_depth_mm"][front]
-    assert (np.isfinite(found) == np.isfinite(expected)).all() and np.isfinite(expected).sum() == 61 * 61
+    assert (np.isfinite(found) == np.isfinite(expected)).all() and np.isfinite(expected).sum() == 61 * 61, "a depth where there should be none, or none where there should be one"
     near(found[np.isfinite(found)], expected[np.isfinite(expected)], 1e-5, "depth, mm")
     tips, _ = draw.read_mesh(OUT / "depth/tips.ply")
     near([-tips[:, 1].max(), -tips[:, 1].min()], [4, 30], 1e-4, "least and greatest height, mm")
@@ -132,7 +132,7 @@ def figure_3_2():
 def figure_3_3():
     """256 patterns are 15 by rotation and inversion, 23 by rotation alone (Burnside's count), and every outline closes."""
     classes = diagrams.cube_classes()
-    assert len(classes) == 15 and sorted(p for members in classes for p in members) == list(range(256))
+    assert len(classes) == 15 and sorted(p for members in classes for p in members) == list(range(256)), list(map(len, classes))
     turns = diagrams.cube_rotations()
     cycles = [sum(1 for _ in cycle_starts(turn)) for turn in turns]
     assert len(turns) == 24 and len(diagrams.cube_classes(False)) == sum(2**n for n in cycles) // 24 == 23
@@ -157,7 +157,7 @@ def figure_3_4():
         for level in range(cells):
             needed = sorted({k for pair in diagrams.octree_layers(level, cells) for k in pair})
             slots = [diagrams.cache_depth(k, cells) for k in needed]
-            assert needed[0] == 0 and needed[-1] == cells and slots[0] == slots[-1] == 0
+            assert needed[0] == 0 and needed[-1] == cells and slots[0] == slots[-1] == 0, (cells, level, needed, slots)
             assert len(set(slots)) == len(slots) - 1 == cells.bit_length(), (cells, level, slots)
     assert sum(diagrams.octree_nodes(8)) == 85 and diagrams.cached_corners(8) == 405 and (8 + 1)**3 == 729
 
@@ -227,12 +227,10 @@ def de_boor(net, u, v):
 
 
 def figure_4_3():
-    """The standard dowels alone leave finer vertices without a datum: the fit moves fewer of them than with inserted dowels."""
-    moved = []
-    for seeds in ("none", "{level: 1, weight: 1}"):
-        folder = run(f"seeds-{len(seeds)}", SOURCE / "docs/thesis/phantom.yaml", *SMALL, f"seeds={seeds}")
-        moved.append([level["moved_vertices"] for level in result(folder)["fit"]["levels"]][-1])
-    assert 0 < moved[0] < 0.8 * moved[1], moved
+    """The standard dowels alone leave vertices of finer levels without a datum: of 19 x 19 at level 1 the fit moves less than half."""
+    folder = run("standard", SOURCE / "docs/thesis/phantom.yaml", *SMALL, "seeds=none")
+    levels = result(folder)["fit"]["levels"]
+    assert levels[1]["level"] == 1 and 0 < levels[1]["moved_vertices"] < 19 * 19 / 2, levels
 
 
 def figure_5_2():
