@@ -324,10 +324,12 @@ def write_page(out):
     from markdown_it import MarkdownIt
     body = MarkdownIt("commonmark").enable("table").render((ROOT / "docs/thesis.md").read_text())
     body = body.replace('src="thesis/', 'src="').replace('src="reference/sites.svg"', 'src="figure-1-1.svg"')
+    slug = lambda title: re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-")
+    body = re.sub(r"<(h[23])>(.*?)</", lambda head: f'<{head[1]} id="{slug(head[2])}">{head[2]}</', body)
     body = re.sub(r'href="(?!http|#)([^"]*)"', lambda link: f'href="{(ROOT / "docs" / link[1]).as_uri()}"', body)
     page = ('<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>The figures of the thesis</title><link rel="icon" href="data:,">'
             "<style>body { max-width: 60em; margin: 2em auto; padding: 0 1em; font: 16px/1.6 sans-serif } img { max-width: 100% }"
-            " pre { background: #f4f6f8; padding: .8em; overflow-x: auto } td, th { padding: .2em .8em .2em 0; text-align: left }</style></head>\n"
+            " pre { background: #f4f6f8; padding: .8em; white-space: pre-wrap } td, th { padding: .2em .8em .2em 0; text-align: left }</style></head>\n"
             f"<body>\n{body}</body></html>\n")
     (out / "index.html").write_text(page)
     return out / "index.html"
