@@ -2,9 +2,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Makes every figure and table of docs/thesis.md, and one page of them: make.py PROGRAM OUT [--only 3.4]...
 
-Runs the program from the top folder of the source, and draws what it wrote. A run whose folder is complete is not repeated. The page is
-docs/thesis.md with the new pictures. Those of the source are replaced by hand, after a look at them: cp OUT/figure-* OUT/table-* docs/thesis/."""
+Runs the program from the top folder of the source, and draws what it wrote. A complete run is not repeated unless the program or a
+configuration has changed. The page is docs/thesis.md with the new pictures. Those of the source are replaced by hand, after a look at them:
+cp OUT/figure-[2-5]* OUT/figure-1-2* OUT/table-* docs/thesis/"""
 import argparse
+import hashlib
 import re
 import subprocess
 import sys
@@ -50,12 +52,14 @@ RUNS = {
 class Maker:
     def __init__(self, program, out):
         self.program, self.out = Path(program).resolve(), Path(out).resolve()
+        inputs = [self.program, ROOT / "docs/thesis/shapes.py", *sorted((ROOT / "docs/thesis").glob("*.yaml")), *sorted((ROOT / "configs").rglob("*.yaml"))]
+        self.made_from = hashlib.sha256(b"".join(path.read_bytes() for path in inputs)).hexdigest()
 
     def run(self, name):
         """The folder of a run, which is made first if it is not there. Exit code 1 means that a face is not usable, and shapes and the
         thesis's own fit are not meant to be."""
-        folder = self.out / name
-        if (folder / "done").exists():
+        folder, key = self.out / name, f"{self.made_from} {RUNS[name]}"
+        if (folder / "made_from").exists() and (folder / "made_from").read_text() == key:
             return folder
         start = time.monotonic()
         words = RUNS[name].replace("OUT", str(self.out)).split()
@@ -64,7 +68,7 @@ class Maker:
                               stderr=subprocess.PIPE, text=True)
         if done.returncode > 1:
             sys.exit(f"make.py: {RUNS[name]}: {done.stderr}")
-        (folder / "done").touch()
+        (folder / "made_from").write_text(key)
         print(f"  {name}: {time.monotonic() - start:.0f} s", flush=True)
         return folder
 
