@@ -63,6 +63,21 @@ def border_edges(triangles):
     return int((uses == 1).sum())
 
 
+def distance_mm(point, triangles):
+    """The distance of a point from the nearest of many triangles (n x 3 corners x 3): the plane, if the foot lies inside, else the edges."""
+    a, b, c = triangles.swapaxes(0, 1)
+    normal = np.cross(b - a, c - a)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    height = ((point - a) * normal).sum(1)
+    foot = point - height[:, None] * normal
+    inside = np.all([(np.cross(q - p, foot - p) * normal).sum(1) >= 0 for p, q in ((a, b), (b, c), (c, a))], axis=0)
+    best = np.abs(height[inside]).min(initial=np.inf)
+    for p, q in ((a, b), (b, c), (c, a)):
+        t = np.clip(((point - p) * (q - p)).sum(1) / ((q - p)**2).sum(1), 0, 1)
+        best = min(best, np.linalg.norm(p + t[:, None] * (q - p) - point, axis=1).min())
+    return best
+
+
 # ---------------------------------------------------------------------------------------------------------------------
 # A picture of meshes
 # ---------------------------------------------------------------------------------------------------------------------
@@ -97,13 +112,13 @@ class Picture:
         self.colours[pixel[seen]] = colours[seen]
         self.nearest[pixel[seen]] = depth[seen]
 
-    def shades(self, normals, colours, blend=1.0):
+    def shades(self, normals, colours):
         """Light from the viewer's upper left. A back is grey and darker."""
         seen = normals @ self.axes.T
         key = np.clip(seen @ (np.array([-0.4, 0.5, 0.77])), 0, 1)[:, None]
         front = np.asarray(colours, float) * (0.34 + 0.68 * key)
         back = np.array([118, 112, 108]) * (0.5 + 0.5 * np.abs(seen[:, 2:3]))
-        return np.clip(np.where(seen[:, 2:3] >= 0, front, back), 0, 255) * blend
+        return np.clip(np.where(seen[:, 2:3] >= 0, front, back), 0, 255)
 
     def mesh(self, points, triangles, colours=SKIN, flat=False):
         """colours: one for all vertices, or one per vertex. flat: each triangle has the light of its own plane."""

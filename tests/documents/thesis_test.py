@@ -184,23 +184,8 @@ def figure_3_6():
     assert counts["triangles_dense"] == len(dense) and counts["triangles"] == len(corners) == 1400, counts
     assert draw.genus(dense) == draw.genus(corners) == 0, (draw.genus(dense), draw.genus(corners))
     sample = points[::max(1, len(points) // 300)]
-    farthest = max(distance_to_mesh(point, fewer[corners]) for point in sample)
+    farthest = max(draw.distance_mm(point, fewer[corners]) for point in sample)
     assert farthest <= counts["decimation_error_mm"] + 1e-3, (farthest, counts)
-
-
-def distance_to_mesh(point, triangles):
-    """The distance of a point from the nearest of many triangles (n x 3 corners x 3): the plane, if the foot lies inside, else the edges."""
-    a, b, c = triangles.swapaxes(0, 1)
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    height = ((point - a) * normal).sum(1)
-    foot = point - height[:, None] * normal
-    inside = np.all([(np.cross(q - p, foot - p) * normal).sum(1) >= 0 for p, q in ((a, b), (b, c), (c, a))], axis=0)
-    best = np.abs(height[inside]).min(initial=np.inf)
-    for p, q in ((a, b), (b, c), (c, a)):
-        t = np.clip(((point - p) * (q - p)).sum(1) / ((q - p)**2).sum(1), 0, 1)
-        best = min(best, np.linalg.norm(p + t[:, None] * (q - p) - point, axis=1).min())
-    return best
 
 
 def figure_4_1():
