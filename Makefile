@@ -63,7 +63,7 @@ site: PACKAGES = $(shell grep -E '^python3(-markdown-it)? ' .ci/packages.txt | s
 site: setup
 	@/usr/bin/python3 docs/site.py out/site
 
-# Every figure and table of docs/thesis.md on one page, out/thesis/index.html; about MINUTES_OF_THESIS minutes on two cores. ONLY makes some:
+# Every figure and table of docs/thesis.md on one page, out/thesis/index.html; about ten minutes on two cores. ONLY makes some:
 # ONLY="3.4 A.1".
 thesis: PACKAGES = $(RUN_PACKAGES) python3 python3-numpy python3-markdown-it
 thesis: PRESET = quick
