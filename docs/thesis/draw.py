@@ -57,12 +57,6 @@ def genus(triangles):
     return 1 - (len(np.unique(triangles)) - count + len(triangles)) / 2
 
 
-def border_edges(triangles):
-    edges = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]]), 1)
-    _, uses = np.unique(edges, axis=0, return_counts=True)
-    return int((uses == 1).sum())
-
-
 def distance_mm(point, triangles):
     """The distance of a point from the nearest of many triangles (n x 3 corners x 3): the plane, if the foot lies inside, else the edges."""
     a, b, c = triangles.swapaxes(0, 1)
