@@ -139,9 +139,9 @@ def face_corners():
     return faces
 
 
-def case_loops(pattern):
-    """The outlines of the surface in a cube, as lists of the middles of edges. Inside corners that lie diagonally on a face are separated,
-    as the program does (surfaces/marching/marching_cubes.h), so neighbouring cubes agree and no hole opens."""
+def joined_edges(pattern):
+    """For each crossed edge of the cube, the two that the outline joins it to. Inside corners that lie diagonally on a face are separated, as
+    the program does (surfaces/marching/marching_cubes.h), so neighbouring cubes agree and no hole opens."""
     inside = lambda corner: pattern >> corner & 1
     joined = {}
     for face in face_corners():
@@ -155,7 +155,12 @@ def case_loops(pattern):
                 ends = [tuple(sorted((before, corner))), tuple(sorted((face[n % 4], face[(n + 1) % 4])))]
                 for a, b in (ends, ends[::-1]):
                     joined.setdefault(a, []).append(b)
-    loops = []
+    return joined
+
+
+def case_loops(pattern):
+    """The outlines of the surface in a cube, as lists of the middles of edges."""
+    joined, loops = joined_edges(pattern), []
     while joined:
         loop = [next(iter(joined))]
         while True:
@@ -230,6 +235,15 @@ def emitter_cache(cells=8, level=2):
         svg.line((left + i * size / 1.6, y_of(0)), (left + i * size / 1.6, y_of(cells)), GREY)
     svg.polygon([(left, y_of(level)), (left + cells * size / 1.6, y_of(level)), (left + cells * size / 1.6, y_of(level + 1)),
                  (left, y_of(level + 1))], BLUE, BLUE, 1.4, 0.3)
+    draw_nodes(svg, cells, level, right, size, y_of)
+    svg.text((left + 100, 24), f"march of {cells} levels, the third in blue", 13)
+    svg.text((right + 115, 24), f"the {sum(octree_nodes(cells))} nodes around it, from the side", 13)
+    svg.text((400, 410), f"{cached_corners(cells)} corners are kept, where all layers would have {(cells + 1)**3}.", 13)
+    return str(svg)
+
+
+def draw_nodes(svg, cells, level, right, size, y_of):
+    """The nodes of each depth around a level, and the layers that they need."""
     colours = [INK, GREEN, RED, BLUE]
     for depth, (low, high) in reversed(list(enumerate(octree_layers(level, cells)))):
         span = cells >> depth
@@ -240,10 +254,6 @@ def emitter_cache(cells=8, level=2):
         for k in {low, high}:
             if cache_depth(k, cells) == depth:
                 svg.text((right + cells * size * 0.72 + 46, y_of(k) + 5), f"k={k}: d={depth}", 13, colour=colours[depth % 4])
-    svg.text((left + 100, 24), f"march of {cells} levels, the third in blue", 13)
-    svg.text((right + 115, 24), f"the {sum(octree_nodes(cells))} nodes around it, from the side", 13)
-    svg.text((400, 410), f"{cached_corners(cells)} corners are kept, where all layers would have {(cells + 1)**3}.", 13)
-    return str(svg)
 
 
 # ---------------------------------------------------------------------------------------------------------------------

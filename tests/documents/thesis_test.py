@@ -96,7 +96,7 @@ def figure_2_3():
     front = np.abs(vertices["y"]) < 1e-6
     expected = shapes.plane_depth(vertices["x"], vertices["z"])[front]
     found = vertices["scalar_depth_mm"][front]
-    assert (np.isfinite(found) == np.isfinite(expected)).all() and np.isfinite(expected).sum() == 61 * 61, "a depth where there should be none, or none where there should be one"
+    assert (np.isfinite(found) == np.isfinite(expected)).all() and np.isfinite(expected).sum() == 61 * 61, "vertices with a depth"
     near(found[np.isfinite(found)], expected[np.isfinite(expected)], 1e-5, "depth, mm")
     tips, _ = draw.read_mesh(OUT / "depth/tips.ply")
     near([-tips[:, 1].max(), -tips[:, 1].min()], [4, 30], 1e-4, "least and greatest height, mm")
