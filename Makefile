@@ -9,7 +9,7 @@ PROGRAM      := $(BUILD)/problems/semblance
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build demo demo-phantom deb site test harness bench same-bytes clang-numbers sanitize races coverage \
+.PHONY: all setup configure build demo demo-phantom deb site thesis test harness bench same-bytes clang-numbers sanitize races coverage \
   format check headers tidy configs clean
 
 all: build
@@ -62,6 +62,14 @@ deb: configure
 site: PACKAGES = $(shell grep -E '^python3(-markdown-it)? ' .ci/packages.txt | sed 's/#.*//')
 site: setup
 	@/usr/bin/python3 docs/site.py out/site
+
+# Every figure and table of docs/thesis.md on one page, out/thesis/index.html; about ten minutes on two cores. ONLY makes some:
+# ONLY="3.4 A.1".
+thesis: PACKAGES = $(RUN_PACKAGES) python3 python3-numpy python3-markdown-it
+thesis: PRESET = quick
+thesis: configure
+	@cmake --build --preset quick --target semblance
+	@/usr/bin/python3 -B docs/thesis/make.py build-quick/problems/semblance out/thesis $(addprefix --only ,$(ONLY))
 
 test: build
 	@ctest --preset $(PRESET) -j "$$(nproc)"
@@ -136,7 +144,7 @@ tidy: setup
 # of the project, and published.yaml names no subject: their inputs are not opened.
 configs: PARTS = configs/published.yaml
 configs: build
-	@$(PROGRAM) check $(filter-out $(PARTS),$(wildcard configs/*.yaml)) configs/fit/*.yaml configs/studies/*.yaml
+	@$(PROGRAM) check $(filter-out $(PARTS),$(wildcard configs/*.yaml)) configs/fit/*.yaml configs/studies/*.yaml docs/thesis/*.yaml
 	@$(PROGRAM) check --without-inputs $(PARTS) configs/heads/*.yaml configs/demo_phantom/*.yaml configs/population/*.yaml
 
 clean:

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Makes static pages of the documents: site.py OUT. README.md becomes index.html, docs/FOLDER/NAME.md FOLDER-NAME.html, and docs/FOLDER/README.md
-FOLDER.html. Pictures and other files of the project that the documents link to are copied to files/. The pages load nothing from a network. Needs
+"""Makes static pages of the documents: site.py OUT. README.md becomes index.html, docs/FOLDER/NAME.md FOLDER-NAME.html, docs/NAME.md
+docs-NAME.html, and docs/FOLDER/README.md FOLDER.html. Pictures and other files of the project that the documents link to are copied to files/. The pages load nothing from a network. Needs
 Debian's python3-markdown-it, which `make site` installs."""
 import html
 import os
@@ -19,7 +19,7 @@ PARSER = MarkdownIt("commonmark").enable("table")
 ROOT = Path(__file__).resolve().parent.parent
 # The folders of docs/ in the order of the contents, with their headings. Within a folder the pages of ORDER come first, then the others by title.
 PARTS = [("Start", ""), ("Tutorials", "tutorial"), ("How to", "how-to"), ("Reference", "reference"), ("Explanation", "explanation"),
-         ("Experiments", "experiments")]
+         ("Experiments", "experiments"), ("The thesis", "docs")]
 ORDER = ["README.md", "first-face.md", "first-study.md", "workbench.md", "gallery.md", "install.md", "architecture.md", "commands.md", "options.md"]
 CSS = """
 :root { color-scheme: light dark; --ink: #1d2126; --paper: #fff; --line: #dfe3e8; --link: #0b5a8f; --code: #f4f6f8 }
