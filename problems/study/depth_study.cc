@@ -40,8 +40,8 @@ std::vector<std::pair<std::string, CrossValidation>> LeaveOut(const Experiment& 
   std::vector<std::pair<std::string, CrossValidation>> left_out;
   for (const auto& [kind, folds] :
        KindsOfFolds(experiment.cross_validation, stage.dowels_on_shell)) {
-    left_out.emplace_back(
-        kind, CrossValidate(WayToDepth(experiment), experiment.outside, stage.Input(), folds, context));
+    left_out.emplace_back(kind, CrossValidate(WayToDepth(experiment), experiment.outside,
+                                              stage.Input(), folds, context));
   }
   return left_out;
 }
