@@ -138,20 +138,30 @@ struct MarkedDepths {
   std::vector<SiteDepth> dropped;  // sites that get no depth
 };
 
-MarkedDepths Propose(const SubjectData& data, const std::string& name,
-                     std::span<const ReferenceHead> references, const RunContext& context) {
-  if (references.empty()) {
+Proposal ProposeFrom(const LandmarkReferences& references, const TriMesh& skull, SkullLies lies,
+                     const RunContext& context) {
+  const std::string name = "the skull";
+  if (!references.heads.empty()) {
+    return ProposeLandmarks(skull, name, references.heads, context, {}, lies);
+  }
+  if (!references.mean) {
     throw InputError(
-        "it has no landmarks, and no reference skull has any from which they could be proposed; "
-        "name "
+        "it has no landmarks, and there is no reference from which they could be proposed; name "
         "one under measure.references");
   }
-  const Proposal proposal = ProposeLandmarks(data.skull, "the skull", references, context);
+  return ProposeLandmarks(skull, name, *references.mean, context, {}, lies);
+}
+
+MarkedDepths Propose(const SubjectData& data, const PopulationSubject& subject,
+                     const LandmarkReferences& references, const RunContext& context) {
+  const bool is_ct = std::holds_alternative<CtSubject>(subject.subject);
+  const Proposal proposal =
+      ProposeFrom(references, data.skull, is_ct ? SkullLies::kUpright : SkullLies::kAnyhow, context);
   if (proposal.axes != "LPS") {
     throw InputError(
         fmt::format("its skull seems to be in {0}; write `axes: {0}` there", proposal.axes));
   }
-  MarkedDepths marked{ProposalFile(proposal, name), {}, {}};
+  MarkedDepths marked{ProposalFile(proposal, subject.name), {}, {}};
   for (const ProposedSite& site : proposal.sites) {
     marked.confidence[site.site] = site.confidence;
   }
@@ -302,14 +312,17 @@ void ImportScan(const PhantomOptions& phantom, const PhantomScan& scan, SubjectD
 }  // namespace
 
 SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOptions& options,
-                             std::span<const ReferenceHead> references, const RunContext& context) {
+                             const LandmarkReferences& references, const RunContext& context) {
+  if (!subject.fault.empty()) {
+    throw InputError(subject.fault);
+  }
   SubjectData data = LoadSubject(subject.subject, context, Landmarking::kOpen);
   if (!data.skin) {
     throw InputError("it has no skin; a depth needs one");
   }
   const bool open = data.landmarks.landmarks.empty();
   MarkedDepths marked =
-      open ? Propose(data, subject.name, references, context) : AsRead(std::move(data.landmarks));
+      open ? Propose(data, subject, references, context) : AsRead(std::move(data.landmarks));
   if (marked.file.proposed) {
     DropSamePoints(marked);
   }
