@@ -3,9 +3,11 @@
 // measured and made into a table.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -162,9 +164,16 @@ void Fields(Visitor& visit, DenseOptions& o) {
       o.modes);
 }
 
+// The direction in which a depth is measured along a normal.
+enum class DepthDirection { kAuto, kBoneNormal, kAverage };
+constexpr auto EnumNames(DepthDirection) {
+  return std::to_array<std::string_view>({"auto", "bone_normal", "average"});
+}
+
 // The options that determine the measured depths of a subject, and with them its result file.
 struct MeasureOptions {
   DepthConvention convention = DepthConvention::kAlongBoneNormal;
+  DepthDirection direction = DepthDirection::kAuto;
   PlaceOptions landmarks;
   DepthTruthOptions depth_truth;
   DenseOptions dense;
@@ -176,6 +185,12 @@ void Fields(Visitor& visit, MeasureOptions& o) {
                   .doc = "along_bone_normal: to the first skin along the bone's normal; "
                          "closest_point: to the closest skin. Tables of the two differ"},
         o.convention);
+  visit(FieldInfo{.name = "direction",
+                  .doc = "bone_normal: the bone's mean normal at the landmark; average: the normal "
+                         "of 54 people's bone at the site, turned with the skull; auto: average "
+                         "for proposed landmarks on voxels of more than 2.5 mm, whose bone has no "
+                         "reliable normal, and bone_normal otherwise"},
+        o.direction);
   visit(FieldInfo{.name = "landmarks", .doc = "how landmarks are laid onto bone"}, o.landmarks);
   visit(FieldInfo{.name = "depth_truth", .doc = "what counts as a depth"}, o.depth_truth);
   visit(FieldInfo{.name = "dense", .doc = "depth over the whole skull"}, o.dense);

@@ -165,6 +165,9 @@ MarkedDepths Propose(const SubjectData& data, const PopulationSubject& subject,
   for (const ProposedSite& site : proposal.sites) {
     marked.confidence[site.site] = site.confidence;
   }
+  for (const AbsentLandmark& absent : proposal.absent) {
+    marked.dropped.push_back({.site = absent.site, .confidence = kNaN, .why_not = absent.reason});
+  }
   return marked;
 }
 
@@ -233,6 +236,22 @@ std::string DescribeStatus(TruthStatus status) {
       return "the closest skin is behind the bone";
   }
   return "";
+}
+
+// Gives each depth marker of a standard site the direction that the bone has there on average.
+void TurnToAverage(const LandmarkFile& landmarks, std::vector<Dowel>& dowels) {
+  const Mat3 rotation = FitAverageSkull(landmarks.Points()).skull_from_average.rotation;
+  for (Dowel& dowel : dowels) {
+    if (IsStandardSite(dowel.site)) {
+      dowel.direction = rotation * AverageDirection(dowel.site);
+    }
+  }
+}
+
+bool UsesAverage(DepthDirection direction, bool proposed, double voxel_mm) {
+  constexpr double kReliable_mm = 2.5;  // normals of bone are within some degrees below
+  return direction == DepthDirection::kAverage ||
+         (direction == DepthDirection::kAuto && proposed && voxel_mm > kReliable_mm);
 }
 
 const TruthMap& ChooseMap(DepthConvention convention, const DepthTruth& truth) {
@@ -344,7 +363,10 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
   const TriMesh skin = Submesh(*data.skin, SeenFromOutside(*data.skin, context.threads));
   const TriMesh skull = Submesh(data.skull, SeenFromOutside(data.skull, context.threads));
   context.ThrowIfStopped();
-  const std::vector<Dowel> dowels = PlaceDowels(marked.file, data.skull, options.landmarks);
+  std::vector<Dowel> dowels = PlaceDowels(marked.file, data.skull, options.landmarks);
+  if (UsesAverage(options.direction, marked.file.proposed, data.voxel_mm)) {
+    TurnToAverage(marked.file, dowels);
+  }
   depths.sites = DepthsAtSites(subject, marked, dowels, skin, options, context);
   for (const SiteDepth& dropped : marked.dropped) {
     depths.notes.push_back(fmt::format("{}: {}", dropped.site, dropped.why_not));
