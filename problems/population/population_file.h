@@ -239,7 +239,8 @@ struct PopulationFile {
   std::string id = "population";
   std::string label;
   std::vector<PopulationSubject> subjects;
-  CtImportOptions import;
+  // Midway between air and tissue, where the skin's edge does not move with the size of the voxels.
+  CtImportOptions import = {.skin_hu = -500};
   PhantomCrowd phantoms;
   MeasureOptions measure;
   double least_confidence = 0.2;
@@ -256,8 +257,8 @@ void Fields(Visitor& visit, PopulationFile& o) {
   visit(FieldInfo{.name = "label", .doc = "who was measured, for the table"}, o.label);
   visit(FieldInfo{.name = "subjects", .doc = "the subjects to measure"}, o.subjects);
   visit(FieldInfo{.name = "import",
-                  .doc = "how skull and skin are taken from the volumes of a folder; `subjects` "
-                         "have options of their own"},
+                  .doc = "how skull and skin are taken from the volumes of a folder, by default "
+                         "with skin_hu -500; `subjects` have options of their own"},
         o.import);
   visit(FieldInfo{.name = "phantoms", .doc = "made-up heads, in addition to the subjects"},
         o.phantoms);

@@ -211,12 +211,16 @@ class Proposer {
                        kNoBone_mm, snapped.from_bone_mm)});
       return;
     }
-    const Vec3 point = bone_.Closest(snapped.point).position;
-    if (const std::string fault =
-            SuggestionFault(point, rotation * AverageDirection(site), {skull_, bone_, ends_});
+    const Vec3 outward = rotation * AverageDirection(site);
+    Vec3 point = bone_.Closest(snapped.point).position;
+    if (const std::string fault = SuggestionFault(point, outward, {skull_, bone_, ends_});
         !fault.empty()) {
-      proposal_.absent.push_back({site, fault});
-      return;
+      const auto outer = FindOuterPoint(predicted, outward, {skull_, bone_, ends_});
+      if (!outer || (*outer - predicted).norm() > kNoBone_mm) {
+        proposal_.absent.push_back({site, fault});
+        return;
+      }
+      point = *outer;
     }
     ProposedSite found{.site = site,
                        .point = point,
