@@ -57,13 +57,14 @@ std::string DescribeSubject(const PopulationSubject& subject, FileHashes& hashes
                                : subject.name + "\n" + subject.fault;
 }
 
-// How subjects with landmarks are measured.
+// The options by which subjects with landmarks are measured, as text.
 std::string DescribeMarked(MeasureOptions options, FileHashes& hashes) {
   options.references.clear();
   return Fingerprint(options, hashes);
 }
 
-// How subjects without landmarks are measured. The mean skull is part of it if it proposes them.
+// The options by which subjects without landmarks are measured, as text. The mean skull is part of
+// it if it proposes them.
 std::string DescribeOpen(const MeasureOptions& options, FileHashes& hashes) {
   std::string text = Fingerprint(options, hashes);
   if (options.references.empty()) {
@@ -146,8 +147,8 @@ fs::path FindEntry(const std::vector<fs::path>& entries, const std::string& name
     }
   }
   if (found.size() > 1) {
-    throw InputError(fmt::format("both {} and {} are there; keep one",
-                                 found[0].filename().string(), found[1].filename().string()));
+    throw InputError(fmt::format("both {} and {} are there; keep one", found[0].filename().string(),
+                                 found[1].filename().string()));
   }
   return found.empty() ? fs::path() : found[0];
 }
@@ -226,8 +227,8 @@ std::optional<PopulationSubject> ReadSubjectFolder(const fs::path& folder,
     return PopulationSubject{.name = name, .subject = std::move(*subject)};
   }
   if (!IsHidden(folder)) {
-    notes.push_back(
-        fmt::format("{}: skipped; it contains no skull and skin, and no volume, ct or dicom", name));
+    notes.push_back(fmt::format(
+        "{}: skipped; it contains no skull and skin, and no volume, ct or dicom", name));
   }
   return std::nullopt;
 } catch (const Error& error) {
@@ -422,8 +423,8 @@ PopulationPlan ReadPopulation(const fs::path& path) {
   const bool all_marked = std::ranges::all_of(subjects, HasLandmarks);
   const std::string open = all_marked ? marked : DescribeOpen(plan.file.measure, hashes);
   for (const PopulationSubject& subject : subjects) {
-    const std::string text = DescribeSubject(subject, hashes) + "\n" +
-                             (HasLandmarks(subject) ? marked : open);
+    const std::string text =
+        DescribeSubject(subject, hashes) + "\n" + (HasLandmarks(subject) ? marked : open);
     plan.entries.push_back({subject, Sha256OfText(text).substr(0, kIdDigits)});
   }
   CheckNames(plan.entries);

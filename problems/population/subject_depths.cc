@@ -155,8 +155,8 @@ Proposal ProposeFrom(const LandmarkReferences& references, const TriMesh& skull,
 MarkedDepths Propose(const SubjectData& data, const PopulationSubject& subject,
                      const LandmarkReferences& references, const RunContext& context) {
   const bool is_ct = std::holds_alternative<CtSubject>(subject.subject);
-  const Proposal proposal =
-      ProposeFrom(references, data.skull, is_ct ? SkullLies::kUpright : SkullLies::kAnyhow, context);
+  const Proposal proposal = ProposeFrom(references, data.skull,
+                                        is_ct ? SkullLies::kUpright : SkullLies::kAnyhow, context);
   if (proposal.axes != "LPS") {
     throw InputError(
         fmt::format("its skull seems to be in {0}; write `axes: {0}` there", proposal.axes));

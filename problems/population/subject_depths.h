@@ -45,12 +45,11 @@ struct LandmarkReferences {
 
 // Measures a subject. Its landmarks, or proposed ones, are laid on the bone, and the depth there is
 // measured to the skin that is visible from outside. `references` must not be empty if the subject
-// has no landmarks. The skull of a volume is upright, because its header says how the person lay. If
-// several proposed landmarks have the same point (landmark_mistakes.h), the
-// one with the highest confidence counts; the others become sites without a depth. Throws
-// InputError as LoadSubject, CheckSubject and ProposeLandmarks, for a subject with a fault, and for
-// one without a skin;
-// throws Cancelled. The messages do not contain the subject's name; the caller adds it.
+// has no landmarks. The skull of a volume is upright, because its header says how the person lay.
+// If several proposed landmarks have the same point (landmark_mistakes.h), the one with the highest
+// confidence counts; the others become sites without a depth. Throws InputError as LoadSubject,
+// CheckSubject and ProposeLandmarks, for a subject with a fault, and for one without a skin; throws
+// Cancelled. The messages do not contain the subject's name; the caller adds it.
 SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOptions& options,
                              const LandmarkReferences& references, const RunContext& context);
 

@@ -51,11 +51,12 @@ struct Proposal {
 // is in mm and in any pose. `name` is for messages. The result does not depend on context.threads.
 //
 // `known` are sites that a person has placed. Three of them give the pose, so that no search is
-// needed, and the warps meet them. They are not proposed again. `lies` narrows the search otherwise.
+// needed, and the warps meet them. They are not proposed again. `lies` narrows the search
+// otherwise.
 //
-// Points that are no good for a face are not proposed (suggestion_check.h). The bone that is met first
-// from outside takes their place, if it is within 8 mm of the prediction; otherwise the site is
-// absent.
+// Points that are no good for a face are not proposed (suggestion_check.h). The bone that is met
+// first from outside takes their place, if it is within 8 mm of the prediction; otherwise the site
+// is absent.
 //
 // Throws InputError if there is no reference, if the mesh is not a head's (mesh_check.h), if it
 // holds two skulls, if its shape does not determine its pose or the known sites do not fit it, if

@@ -39,8 +39,8 @@ struct SkullPose {
   double rival_misfit_mm = kNaN;
 };
 
-// What is known of a skull before its pose is searched. A mesh may lie anyhow; the header of a CT
-// states the axes, so its skull is upright.
+// Says whether the search of the pose may assume an upright skull. A mesh may lie anyhow; the
+// header of a CT states the axes, so its skull is upright.
 enum class SkullLies { kAnyhow, kUpright };
 
 // Finds the pose by trimmed ICP in both directions with scale. Most files lie upright, in LPS or

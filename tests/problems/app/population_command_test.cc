@@ -47,10 +47,12 @@ TEST_F(PopulationCommand, TooFewSubjectsAreNotUsableAndEachFailureIsPrinted) {
   const testing::Outcome outcome = Call("heads --out out");
   EXPECT_EQ(outcome.code, 1) << outcome.err;
   for (const char* name : {"s1", "s2", "s3"}) {
-    EXPECT_THAT(outcome.out, HasSubstr(fmt::format("failed: {}: it has a skull and no skin", name)));
+    EXPECT_THAT(outcome.out,
+                HasSubstr(fmt::format("failed: {}: it has a skull and no skin", name)));
   }
   EXPECT_THAT(outcome.out, HasSubstr("no table: heads: 0 subjects are measured (3 failed"));
-  EXPECT_THAT(ReadFileBytes(folder_ / "out/subjects.csv"), HasSubstr(",failed,it has a skull and no skin"));
+  EXPECT_THAT(ReadFileBytes(folder_ / "out/subjects.csv"),
+              HasSubstr(",failed,it has a skull and no skin"));
   EXPECT_FALSE(fs::exists(folder_ / "out/table.yaml"));
 }
 

@@ -146,9 +146,7 @@ TEST(MeasurePopulation, ContinuesWhereItStoppedAndShardsGiveTheSameBytes) {
   }
 }
 
-RunContext OnThreads(int threads) {
-  return {.on_event = {}, .stop_token = {}, .threads = threads};
-}
+RunContext OnThreads(int threads) { return {.on_event = {}, .stop_token = {}, .threads = threads}; }
 
 // A phantom is no human skull, so the landmarks come from another phantom.
 TEST(MeasurePopulation, OfVolumesInAFolderGoesOnAfterBadOnesAndShardsGiveTheSameTable) {
@@ -500,17 +498,15 @@ TEST(ReadPopulation, OfAFolderAcceptsCapitalsAndNotesSkippedFolders) {
 TEST(ReadPopulation, VolumesInAFolderAreSubjectsAndOtherFilesAreNot) {
   const ScratchFolder folder;
   WriteHead(folder / "heads/f", 1, /*with_landmarks=*/true);
-  for (const char* file :
-       {"a.nrrd", "b.NII.GZ", "c.mhd", "c.raw", "d.1.inv3", "README.md", "LICENSE.open-kbp",
-        "depths.csv", "volume.txt", ".hidden.nrrd"}) {
+  for (const char* file : {"a.nrrd", "b.NII.GZ", "c.mhd", "c.raw", "d.1.inv3", "README.md",
+                           "LICENSE.open-kbp", "depths.csv", "volume.txt", ".hidden.nrrd"}) {
     WriteFileAtomically(folder / "heads" / file, "");
   }
   fs::create_symlink("nowhere", folder / "heads/e.nii");
   WriteFileAtomically(folder / "heads/population.yaml", "import: {skin_hu: -450}\n");
   const PopulationPlan plan = ReadPopulation(folder / "heads");
   EXPECT_THAT(NamesOf(plan), ElementsAre("a", "b", "c", "d.1", "e", "f"));
-  EXPECT_EQ(std::get<CtSubject>(plan.entries[1].subject.subject).volume,
-            folder / "heads/b.NII.GZ");
+  EXPECT_EQ(std::get<CtSubject>(plan.entries[1].subject.subject).volume, folder / "heads/b.NII.GZ");
   EXPECT_EQ(std::get<CtSubject>(plan.entries[1].subject.subject).import.skin_hu, -450);
   EXPECT_THAT(plan.notes, ElementsAre());
 }
@@ -520,9 +516,7 @@ TEST(ReadPopulation, RefusesTwoEntriesOfOneName) {
   fs::create_directories(folder / "heads");
   WriteFileAtomically(folder / "heads/a.nrrd", "");
   WriteFileAtomically(folder / "heads/a.nii.gz", "");
-  const auto words = [&] {
-    return WordsOf<InputError>([&] { ReadPopulation(folder / "heads"); });
-  };
+  const auto words = [&] { return WordsOf<InputError>([&] { ReadPopulation(folder / "heads"); }); };
   EXPECT_THAT(words(), HasSubstr("heads: a.nii.gz and a.nrrd are both the subject 'a'; rename"));
   fs::remove(folder / "heads/a.nii.gz");
   EXPECT_THAT(NamesOf(ReadPopulation(folder / "heads")), ElementsAre("a"));
