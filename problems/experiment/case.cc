@@ -107,6 +107,8 @@ LandmarkFile Load(const CtSubject& options, Landmarking landmarking, SubjectData
   subject.skull = std::move(import.skull);
   subject.skin = std::move(import.skin);
   Append(subject.notes, import.notes);
+  subject.voxel_mm = std::max({reading.volume.spacing_mm.maxCoeff(),
+                               options.import.coarsen.pixel_mm, options.import.coarsen.slice_mm});
   Mirror(options.mirror, landmarks, subject, context);
   return landmarks;
 }

@@ -23,6 +23,7 @@ struct SubjectData {
   LandmarkFile landmarks;
   std::vector<std::string> notes;
   std::vector<std::filesystem::path> inputs;  // files that were read
+  double voxel_mm = kNaN;  // of a CT: the largest distance of neighbouring voxels, as imported
 };
 
 struct Case {

@@ -6,12 +6,15 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <map>
 #include <set>
 
 #include "problems/config/config.h"
 #include "problems/config/spelling_suggestion.h"
 #include "problems/config/utf8_check.h"
 #include "problems/experiment/input_contents.h"
+#include "problems/io/volumes/read_volume.h"
+#include "problems/subject/propose/mean_skull_files.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
@@ -46,6 +49,30 @@ PopulationSubject WithoutPerson(PopulationSubject subject) {
   subject.age_years.reset();
   subject.bmi.reset();
   return subject;
+}
+
+// A subject with a fault is not read; its name stands for its content.
+std::string DescribeSubject(const PopulationSubject& subject, FileHashes& hashes) {
+  return subject.fault.empty() ? Fingerprint(WithoutPerson(subject), hashes)
+                               : subject.name + "\n" + subject.fault;
+}
+
+// The options by which subjects with landmarks are measured, as text.
+std::string DescribeMarked(MeasureOptions options, FileHashes& hashes) {
+  options.references.clear();
+  return Fingerprint(options, hashes);
+}
+
+// The options by which subjects without landmarks are measured, as text. The mean skull is part of
+// it if it proposes them.
+std::string DescribeOpen(const MeasureOptions& options, FileHashes& hashes) {
+  std::string text = Fingerprint(options, hashes);
+  if (options.references.empty()) {
+    for (const std::string_view file : {MeanSkullMesh(), MeanSkullModes(), MeanSkullSites()}) {
+      text += "\n" + Sha256OfText(file);
+    }
+  }
+  return text;
 }
 
 std::vector<PopulationSubject> Phantoms(const PhantomCrowd& crowd) {
@@ -90,12 +117,19 @@ bool HasLandmarks(const PopulationSubject& subject) {
   return ct == nullptr || !ct->landmarks.empty();
 }
 
-namespace fs = std::filesystem;
+bool IsFolder(const fs::path& entry) {
+  std::error_code ignored;  // an entry that cannot be reached is reported when it is read
+  return fs::is_directory(entry, ignored);
+}
 
 std::vector<fs::path> Sorted(const fs::path& folder) {
+  std::error_code error;
   std::vector<fs::path> entries;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    entries.push_back(entry.path());
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
+    entries.push_back(at->path());
+  }
+  if (error) {
+    throw IoError(fmt::format("the folder cannot be read: {}", error.message()));
   }
   std::ranges::sort(entries);
   return entries;
@@ -113,8 +147,7 @@ fs::path FindEntry(const std::vector<fs::path>& entries, const std::string& name
     }
   }
   if (found.size() > 1) {
-    throw InputError(fmt::format("{}: both {} and {} are there; keep one",
-                                 found[0].parent_path().string(), found[0].filename().string(),
+    throw InputError(fmt::format("both {} and {} are there; keep one", found[0].filename().string(),
                                  found[1].filename().string()));
   }
   return found.empty() ? fs::path() : found[0];
@@ -123,7 +156,7 @@ fs::path FindEntry(const std::vector<fs::path>& entries, const std::string& name
 fs::path FindVolume(const std::vector<fs::path>& entries) {
   std::vector<fs::path> folders;
   std::ranges::copy_if(entries, std::back_inserter(folders),
-                       [](const fs::path& entry) { return fs::is_directory(entry); });
+                       [](const fs::path& entry) { return IsFolder(entry); });
   for (const char* name : {"ct", "dicom"}) {
     if (fs::path folder = FindEntry(folders, name, {""}); !folder.empty()) {
       return folder;
@@ -133,8 +166,9 @@ fs::path FindVolume(const std::vector<fs::path>& entries) {
                    {".nii", ".nii.gz", ".nrrd", ".nhdr", ".mha", ".mhd", ".inv3"});
 }
 
-// The subject in a folder; nothing if the folder contains none.
-std::optional<Subject> FindSubject(const fs::path& folder) {
+// The subject in a folder; nothing if the folder contains none. Throws InputError if the folder
+// contains a part of a subject, or a part twice.
+std::optional<Subject> FindSubject(const fs::path& folder, const CtImportOptions& import) {
   const std::vector<std::string> meshes = {".ply", ".obj", ".stl", ".off"};
   const std::vector<fs::path> entries = Sorted(folder);
   const fs::path landmarks = FindEntry(
@@ -142,7 +176,7 @@ std::optional<Subject> FindSubject(const fs::path& folder) {
   const fs::path skull = FindEntry(entries, "skull", meshes),
                  skin = FindEntry(entries, "skin", meshes);
   if (skull.empty() != skin.empty()) {
-    throw InputError(fmt::format("{}: it has a {} and no {}; a depth needs both", folder.string(),
+    throw InputError(fmt::format("it has a {} and no {}; a depth needs both",
                                  skull.empty() ? "skin" : "skull",
                                  skull.empty() ? "skull" : "skin"));
   }
@@ -160,24 +194,77 @@ std::optional<Subject> FindSubject(const fs::path& folder) {
   CtSubject ct;
   ct.volume = volume;
   ct.landmarks = landmarks;
+  ct.import = import;
   return ct;
 }
 
-bool IsHiddenFolder(const fs::path& entry) { return entry.filename().string().starts_with('.'); }
+bool IsHidden(const fs::path& entry) { return entry.filename().string().starts_with('.'); }
 
-// Adds the subjects of the folders in a folder; adds a note for each folder without a subject.
+bool IsVolumeFile(const fs::path& entry) {
+  return !IsFolder(entry) && !IsHidden(entry) &&
+         (FindVolumeFormat(entry) || LowerCase(entry.extension().string()) == ".inv3");
+}
+
+// The file's name without its ending, of which ".nii.gz" is one.
+std::string VolumeName(const fs::path& file) {
+  const bool is_packed = LowerCase(file.extension().string()) == ".gz";
+  return (is_packed ? file.stem() : file).stem().string();
+}
+
+PopulationSubject MakeVolumeSubject(const fs::path& file, const CtImportOptions& import) {
+  CtSubject ct;
+  ct.volume = file;
+  ct.import = import;
+  return {.name = VolumeName(file), .subject = ct};
+}
+
+// The subject of a folder. Nothing, with a note, if the folder contains none.
+std::optional<PopulationSubject> ReadSubjectFolder(const fs::path& folder,
+                                                   const CtImportOptions& import,
+                                                   std::vector<std::string>& notes) try {
+  const std::string name = folder.filename().string();
+  if (auto subject = FindSubject(folder, import)) {
+    return PopulationSubject{.name = name, .subject = std::move(*subject)};
+  }
+  if (!IsHidden(folder)) {
+    notes.push_back(fmt::format(
+        "{}: skipped; it contains no skull and skin, and no volume, ct or dicom", name));
+  }
+  return std::nullopt;
+} catch (const Error& error) {
+  if (IsHidden(folder)) {
+    return std::nullopt;
+  }
+  CtSubject unread;
+  unread.volume = folder;
+  return PopulationSubject{
+      .name = folder.filename().string(), .subject = unread, .fault = error.what()};
+}
+
+// The subject of an entry of the folder; nothing for other files, such as a text or a table.
+std::optional<PopulationSubject> ReadEntry(const fs::path& entry, const CtImportOptions& import,
+                                           std::vector<std::string>& notes) {
+  if (IsFolder(entry)) {
+    return ReadSubjectFolder(entry, import, notes);
+  }
+  return IsVolumeFile(entry) ? std::optional(MakeVolumeSubject(entry, import)) : std::nullopt;
+}
+
+// Adds the subjects in a folder, and a note for each folder without a subject.
 void AddSubjects(const fs::path& folder, PopulationFile& file, std::vector<std::string>& notes) {
+  std::map<std::string, fs::path> entry_of_name;
   for (const fs::path& entry : Sorted(folder)) {
-    if (!fs::is_directory(entry)) {
+    auto subject = ReadEntry(entry, file.import, notes);
+    if (!subject) {
       continue;
     }
-    const std::string name = entry.filename().string();
-    if (auto subject = FindSubject(entry)) {
-      file.subjects.push_back({.name = name, .subject = std::move(*subject)});
-    } else if (!IsHiddenFolder(entry)) {
-      notes.push_back(fmt::format(
-          "{}: skipped; it contains no skull and skin, and no volume, ct or dicom", name));
+    const auto [other, is_new] = entry_of_name.emplace(Normalized(subject->name), entry.filename());
+    if (!is_new) {
+      throw InputError(fmt::format(
+          "{}: {} and {} are both the subject '{}'; rename one of them or move it away",
+          folder.string(), other->second.string(), entry.filename().string(), subject->name));
     }
+    file.subjects.push_back(std::move(*subject));
   }
 }
 
@@ -292,8 +379,8 @@ PopulationFile ReadPopulationFolder(const fs::path& given, std::vector<std::stri
   AddSubjects(folder, file, notes);
   if (file.subjects.empty() && file.phantoms.count == 0) {
     throw InputError(fmt::format(
-        "{}: it contains no subject; each subject needs a folder with skull.ply and skin.ply, or "
-        "with volume.nii.gz or ct/ (DICOM)",
+        "{}: it contains no subject; each subject needs a volume (.nrrd, .nii.gz, .mha ...), or a "
+        "folder with skull.ply and skin.ply, or with volume.nii.gz or ct/ (DICOM)",
         folder.string()));
   }
   if (fs::exists(folder / "subjects.csv")) {
@@ -332,14 +419,12 @@ PopulationPlan ReadPopulation(const fs::path& path) {
   }
   std::ranges::copy(Phantoms(plan.file.phantoms), std::back_inserter(subjects));
   FileHashes hashes;
-  MeasureOptions without = plan.file.measure;
-  without.references.clear();
-  const std::string marked = Fingerprint(without, hashes);
+  const std::string marked = DescribeMarked(plan.file.measure, hashes);
   const bool all_marked = std::ranges::all_of(subjects, HasLandmarks);
-  const std::string open = all_marked ? marked : Fingerprint(plan.file.measure, hashes);
+  const std::string open = all_marked ? marked : DescribeOpen(plan.file.measure, hashes);
   for (const PopulationSubject& subject : subjects) {
-    const std::string text = Fingerprint(WithoutPerson(subject), hashes) + "\n" +
-                             (HasLandmarks(subject) ? marked : open);
+    const std::string text =
+        DescribeSubject(subject, hashes) + "\n" + (HasLandmarks(subject) ? marked : open);
     plan.entries.push_back({subject, Sha256OfText(text).substr(0, kIdDigits)});
   }
   CheckNames(plan.entries);

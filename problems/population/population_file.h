@@ -3,9 +3,11 @@
 // measured and made into a table.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <variant>
 #include <vector>
 
@@ -49,6 +51,8 @@ struct PopulationSubject {
   std::optional<Build> build = std::nullopt;
   std::optional<double> age_years = std::nullopt, bmi = std::nullopt;
   std::optional<PhantomScan> scan = std::nullopt;
+  // Not an option. The reason why the subject's folder cannot be measured; empty if it can.
+  std::string fault = {};
 };
 template <class Visitor>
 void Fields(Visitor& visit, PopulationSubject& o) {
@@ -160,9 +164,16 @@ void Fields(Visitor& visit, DenseOptions& o) {
       o.modes);
 }
 
+// The direction in which a depth is measured along a normal.
+enum class DepthDirection { kAuto, kBoneNormal, kAverage };
+constexpr auto EnumNames(DepthDirection) {
+  return std::to_array<std::string_view>({"auto", "bone_normal", "average"});
+}
+
 // The options that determine the measured depths of a subject, and with them its result file.
 struct MeasureOptions {
   DepthConvention convention = DepthConvention::kAlongBoneNormal;
+  DepthDirection direction = DepthDirection::kAuto;
   PlaceOptions landmarks;
   DepthTruthOptions depth_truth;
   DenseOptions dense;
@@ -174,12 +185,19 @@ void Fields(Visitor& visit, MeasureOptions& o) {
                   .doc = "along_bone_normal: to the first skin along the bone's normal; "
                          "closest_point: to the closest skin. Tables of the two differ"},
         o.convention);
+  visit(FieldInfo{.name = "direction",
+                  .doc = "bone_normal: the bone's mean normal at the landmark; average: the normal "
+                         "of 54 people's bone at the site, turned with the skull; auto: average "
+                         "for proposed landmarks on voxels of more than 2.5 mm, whose bone has no "
+                         "reliable normal, and bone_normal otherwise"},
+        o.direction);
   visit(FieldInfo{.name = "landmarks", .doc = "how landmarks are laid onto bone"}, o.landmarks);
   visit(FieldInfo{.name = "depth_truth", .doc = "what counts as a depth"}, o.depth_truth);
   visit(FieldInfo{.name = "dense", .doc = "depth over the whole skull"}, o.dense);
   visit(FieldInfo{.name = "references",
                   .doc = "skulls with landmarks, from which the landmarks of other subjects are "
-                         "proposed; none: the first three subjects that have landmarks"},
+                         "proposed; none: the first three subjects with meshes and landmarks, or, "
+                         "if there are none, the mean skull of the program"},
         o.references);
 }
 template <class Report>
@@ -221,6 +239,8 @@ struct PopulationFile {
   std::string id = "population";
   std::string label;
   std::vector<PopulationSubject> subjects;
+  // Midway between air and tissue, where the skin's edge does not move with the size of the voxels.
+  CtImportOptions import = {.skin_hu = -500};
   PhantomCrowd phantoms;
   MeasureOptions measure;
   double least_confidence = 0.2;
@@ -236,6 +256,10 @@ void Fields(Visitor& visit, PopulationFile& o) {
   visit(FieldInfo{.name = "id", .doc = "short name of the table, for messages"}, o.id);
   visit(FieldInfo{.name = "label", .doc = "who was measured, for the table"}, o.label);
   visit(FieldInfo{.name = "subjects", .doc = "the subjects to measure"}, o.subjects);
+  visit(FieldInfo{.name = "import",
+                  .doc = "how skull and skin are taken from the volumes of a folder, by default "
+                         "with skin_hu -500; `subjects` have options of their own"},
+        o.import);
   visit(FieldInfo{.name = "phantoms", .doc = "made-up heads, in addition to the subjects"},
         o.phantoms);
   visit(FieldInfo{.name = "measure", .doc = "how each subject is measured"}, o.measure);
@@ -277,7 +301,7 @@ void CheckValue(Report& report, const PopulationFile& o) {
 struct PopulationEntry {
   PopulationSubject subject;
   std::string id;  // 12 hexadecimal digits, a hash of the subject's options, the contents of its
-                   // files and MeasureOptions
+                   // files and MeasureOptions; or of its name and fault
 };
 
 struct PopulationPlan {
@@ -286,16 +310,18 @@ struct PopulationPlan {
   std::vector<std::string> notes;        // subjects that were left out, folders that were skipped
 };
 
-// Reads a population from `path`, which is a YAML file, or a folder with one folder per subject.
-// The folder of a subject contains, in upper or lower case,
+// Reads a population from `path`, which is a YAML file, or a folder. Each volume in the folder
+// (.nii, .nii.gz, .hdr, .nrrd, .nhdr, .mha, .mhd or .inv3) is a subject with the name of its file
+// without the ending. Each folder in it is a subject, too, and contains, in upper or lower case,
 //   skull.* and skin.* (PLY, OBJ, STL or OFF), or a volume (volume.nii.gz, a folder ct/ or dicom/
 //   of DICOM, or any format that ReadVolume accepts); landmarks.*, in any format that ReadLandmarks
 //   accepts (optional).
-// Other folders are skipped, with a note each. The top folder may contain subjects.csv, with the
+// Folders with nothing of this are skipped, with a note each. A folder that contains a part of it,
+// or too much, becomes a subject with a fault. The top folder may contain subjects.csv, with the
 // columns name, sex, build, age_years and bmi as far as they are known, and population.yaml with
-// options. Throws IoError or ConfigError for files that cannot be read, and for a row of
-// subjects.csv that belongs to no subject, repeats a subject, or is out of range. Throws InputError
-// for a name that is empty or appears twice, and if there is no subject.
+// options; other files are ignored. Throws IoError or ConfigError for these two if they cannot be
+// read, and for a row of subjects.csv that belongs to no subject, repeats a subject, or is out of
+// range. Throws InputError for a name that is empty or appears twice, and if there is no subject.
 PopulationPlan ReadPopulation(const std::filesystem::path& path);
 
 // The files that must exist: those of subjects that are not optional, tables and references.

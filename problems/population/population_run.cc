@@ -158,14 +158,17 @@ class PopulationRunner {
   }
 
   // The references, read once when the first subject needs them.
-  std::span<const ReferenceHead> References() {
+  const LandmarkReferences& References() {
     const std::lock_guard lock(references_mutex_);
     if (!references_) {
-      std::vector<ReferenceHead> heads;
+      LandmarkReferences read;
       for (const ReferenceFiles& files : plan_.file.measure.references) {
-        heads.push_back(ReadReference(files.skull, files.landmarks, context_.threads));
+        read.heads.push_back(ReadReference(files.skull, files.landmarks, context_.threads));
       }
-      references_ = std::move(heads);
+      if (read.heads.empty()) {
+        read.mean = ReadMeanSkull();
+      }
+      references_ = std::move(read);
     }
     return *references_;
   }
@@ -182,8 +185,8 @@ class PopulationRunner {
     try {
       const RunContext quiet{
           .on_event = {}, .stop_token = context_.stop_token, .threads = context_.threads};
-      const auto references =
-          NeedsReferences(entry.subject) ? References() : std::span<const ReferenceHead>();
+      const LandmarkReferences& references =
+          NeedsReferences(entry.subject) ? References() : no_references_;
       json["depths"] = ToJson(MeasureSubject(entry.subject, plan_.file.measure, references, quiet));
     } catch (const Error& error) {
       json["status"] = "failed";
@@ -214,7 +217,8 @@ class PopulationRunner {
   std::vector<std::size_t> queue_;
   std::mutex mutex_, references_mutex_;
   PopulationRunSummary summary_;
-  std::optional<std::vector<ReferenceHead>> references_;
+  std::optional<LandmarkReferences> references_;
+  const LandmarkReferences no_references_ = {};
 };
 
 }  // namespace

@@ -138,22 +138,35 @@ struct MarkedDepths {
   std::vector<SiteDepth> dropped;  // sites that get no depth
 };
 
-MarkedDepths Propose(const SubjectData& data, const std::string& name,
-                     std::span<const ReferenceHead> references, const RunContext& context) {
-  if (references.empty()) {
+Proposal ProposeFrom(const LandmarkReferences& references, const TriMesh& skull, SkullLies lies,
+                     const RunContext& context) {
+  const std::string name = "the skull";
+  if (!references.heads.empty()) {
+    return ProposeLandmarks(skull, name, references.heads, context, {}, lies);
+  }
+  if (!references.mean) {
     throw InputError(
-        "it has no landmarks, and no reference skull has any from which they could be proposed; "
-        "name "
+        "it has no landmarks, and there is no reference from which they could be proposed; name "
         "one under measure.references");
   }
-  const Proposal proposal = ProposeLandmarks(data.skull, "the skull", references, context);
+  return ProposeLandmarks(skull, name, *references.mean, context, {}, lies);
+}
+
+MarkedDepths Propose(const SubjectData& data, const PopulationSubject& subject,
+                     const LandmarkReferences& references, const RunContext& context) {
+  const bool is_ct = std::holds_alternative<CtSubject>(subject.subject);
+  const Proposal proposal = ProposeFrom(references, data.skull,
+                                        is_ct ? SkullLies::kUpright : SkullLies::kAnyhow, context);
   if (proposal.axes != "LPS") {
     throw InputError(
         fmt::format("its skull seems to be in {0}; write `axes: {0}` there", proposal.axes));
   }
-  MarkedDepths marked{ProposalFile(proposal, name), {}, {}};
+  MarkedDepths marked{ProposalFile(proposal, subject.name), {}, {}};
   for (const ProposedSite& site : proposal.sites) {
     marked.confidence[site.site] = site.confidence;
+  }
+  for (const AbsentLandmark& absent : proposal.absent) {
+    marked.dropped.push_back({.site = absent.site, .confidence = kNaN, .why_not = absent.reason});
   }
   return marked;
 }
@@ -223,6 +236,22 @@ std::string DescribeStatus(TruthStatus status) {
       return "the closest skin is behind the bone";
   }
   return "";
+}
+
+// Gives each depth marker of a standard site the direction that the bone has there on average.
+void TurnToAverage(const LandmarkFile& landmarks, std::vector<Dowel>& dowels) {
+  const Mat3 rotation = FitAverageSkull(landmarks.Points()).skull_from_average.rotation;
+  for (Dowel& dowel : dowels) {
+    if (IsStandardSite(dowel.site)) {
+      dowel.direction = rotation * AverageDirection(dowel.site);
+    }
+  }
+}
+
+bool UsesAverage(DepthDirection direction, bool proposed, double voxel_mm) {
+  constexpr double kReliable_mm = 2.5;  // normals of bone are within some degrees below
+  return direction == DepthDirection::kAverage ||
+         (direction == DepthDirection::kAuto && proposed && voxel_mm > kReliable_mm);
 }
 
 const TruthMap& ChooseMap(DepthConvention convention, const DepthTruth& truth) {
@@ -302,14 +331,17 @@ void ImportScan(const PhantomOptions& phantom, const PhantomScan& scan, SubjectD
 }  // namespace
 
 SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOptions& options,
-                             std::span<const ReferenceHead> references, const RunContext& context) {
+                             const LandmarkReferences& references, const RunContext& context) {
+  if (!subject.fault.empty()) {
+    throw InputError(subject.fault);
+  }
   SubjectData data = LoadSubject(subject.subject, context, Landmarking::kOpen);
   if (!data.skin) {
     throw InputError("it has no skin; a depth needs one");
   }
   const bool open = data.landmarks.landmarks.empty();
   MarkedDepths marked =
-      open ? Propose(data, subject.name, references, context) : AsRead(std::move(data.landmarks));
+      open ? Propose(data, subject, references, context) : AsRead(std::move(data.landmarks));
   if (marked.file.proposed) {
     DropSamePoints(marked);
   }
@@ -331,7 +363,10 @@ SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOpti
   const TriMesh skin = Submesh(*data.skin, SeenFromOutside(*data.skin, context.threads));
   const TriMesh skull = Submesh(data.skull, SeenFromOutside(data.skull, context.threads));
   context.ThrowIfStopped();
-  const std::vector<Dowel> dowels = PlaceDowels(marked.file, data.skull, options.landmarks);
+  std::vector<Dowel> dowels = PlaceDowels(marked.file, data.skull, options.landmarks);
+  if (UsesAverage(options.direction, marked.file.proposed, data.voxel_mm)) {
+    TurnToAverage(marked.file, dowels);
+  }
   depths.sites = DepthsAtSites(subject, marked, dowels, skin, options, context);
   for (const SiteDepth& dropped : marked.dropped) {
     depths.notes.push_back(fmt::format("{}: {}", dropped.site, dropped.why_not));

@@ -4,11 +4,12 @@
 
 #include <map>
 #include <nlohmann/json_fwd.hpp>
-#include <span>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "problems/population/population_file.h"
+#include "problems/subject/propose/mean_skull.h"
 #include "problems/subject/propose/reference_head.h"
 
 namespace semblance::problems {
@@ -36,14 +37,21 @@ struct SubjectDepths {
   std::vector<std::string> notes;
 };
 
+// The heads from which the landmarks of a subject without landmarks are proposed.
+struct LandmarkReferences {
+  std::vector<ReferenceHead> heads;
+  std::optional<MeanSkull> mean;  // used if there are no heads
+};
+
 // Measures a subject. Its landmarks, or proposed ones, are laid on the bone, and the depth there is
 // measured to the skin that is visible from outside. `references` must not be empty if the subject
-// has no landmarks. If several proposed landmarks have the same point (landmark_mistakes.h), the
-// one with the highest confidence counts; the others become sites without a depth. Throws
-// InputError as LoadSubject, CheckSubject and ProposeLandmarks, and for a subject without a skin;
-// throws Cancelled. The messages do not contain the subject's name; the caller adds it.
+// has no landmarks. The skull of a volume is upright, because its header says how the person lay.
+// If several proposed landmarks have the same point (landmark_mistakes.h), the one with the highest
+// confidence counts; the others become sites without a depth. Throws InputError as LoadSubject,
+// CheckSubject and ProposeLandmarks, for a subject with a fault, and for one without a skin; throws
+// Cancelled. The messages do not contain the subject's name; the caller adds it.
 SubjectDepths MeasureSubject(const PopulationSubject& subject, const MeasureOptions& options,
-                             std::span<const ReferenceHead> references, const RunContext& context);
+                             const LandmarkReferences& references, const RunContext& context);
 
 nlohmann::ordered_json ToJson(const SubjectDepths& depths);
 

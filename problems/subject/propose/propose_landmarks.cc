@@ -61,9 +61,10 @@ double ChanceWithin3mm(double rms_mm) {
 class Proposer {
  public:
   Proposer(const TriMesh& skull, const std::string& name, std::span<const SitePoint> known,
-           const RunContext& context)
+           SkullLies lies, const RunContext& context)
       : name_(name),
         known_(known),
+        lies_(lies),
         context_(context),
         bone_(skull),
         skull_(skull),
@@ -120,7 +121,7 @@ class Proposer {
       return;
     }
     for (const ReferenceHead& head : references_) {
-      const SkullPose pose = FindPose(head.shell, shell_, context_.threads);
+      const SkullPose pose = FindPose(head.shell, shell_, context_.threads, lies_);
       context_.ThrowIfStopped();
       if (PoseFault(pose).empty()) {
         proposal_.pose = pose;
@@ -210,12 +211,16 @@ class Proposer {
                        kNoBone_mm, snapped.from_bone_mm)});
       return;
     }
-    const Vec3 point = bone_.Closest(snapped.point).position;
-    if (const std::string fault =
-            SuggestionFault(point, rotation * AverageDirection(site), {skull_, bone_, ends_});
+    const Vec3 outward = rotation * AverageDirection(site);
+    Vec3 point = bone_.Closest(snapped.point).position;
+    if (const std::string fault = SuggestionFault(point, outward, {skull_, bone_, ends_});
         !fault.empty()) {
-      proposal_.absent.push_back({site, fault});
-      return;
+      const auto outer = FindOuterPoint(predicted, outward, {skull_, bone_, ends_});
+      if (!outer || (*outer - predicted).norm() > kNoBone_mm) {
+        proposal_.absent.push_back({site, fault});
+        return;
+      }
+      point = *outer;
     }
     ProposedSite found{.site = site,
                        .point = point,
@@ -289,6 +294,7 @@ class Proposer {
 
   const std::string& name_;
   std::span<const SitePoint> known_;
+  SkullLies lies_;
   std::span<const ReferenceHead> references_;
   const RunContext& context_;
   MeshQuery bone_;
@@ -341,20 +347,21 @@ SiteDifference CompareSite(const std::string& site, const Landmark* proposed,
 
 Proposal ProposeLandmarks(const TriMesh& skull, const std::string& name,
                           std::span<const ReferenceHead> references, const RunContext& context,
-                          std::span<const SitePoint> known) {
+                          std::span<const SitePoint> known, SkullLies lies) {
   if (references.empty()) {
     throw InputError("landmarks cannot be proposed without a reference; give at least one");
   }
   std::vector<std::string> notes = CheckHeadMesh(skull, name);
-  Proposal proposal = Proposer(skull, name, known, context).RunWith(references);
+  Proposal proposal = Proposer(skull, name, known, lies, context).RunWith(references);
   proposal.notes.insert(proposal.notes.begin(), notes.begin(), notes.end());
   return proposal;
 }
 
 Proposal ProposeLandmarks(const TriMesh& skull, const std::string& name, const MeanSkull& mean,
-                          const RunContext& context, std::span<const SitePoint> known) {
+                          const RunContext& context, std::span<const SitePoint> known,
+                          SkullLies lies) {
   std::vector<std::string> notes = CheckHeadMesh(skull, name);
-  Proposal proposal = Proposer(skull, name, known, context).RunWith(mean);
+  Proposal proposal = Proposer(skull, name, known, lies, context).RunWith(mean);
   proposal.notes.insert(proposal.notes.begin(), notes.begin(), notes.end());
   return proposal;
 }

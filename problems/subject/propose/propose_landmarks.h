@@ -51,21 +51,26 @@ struct Proposal {
 // is in mm and in any pose. `name` is for messages. The result does not depend on context.threads.
 //
 // `known` are sites that a person has placed. Three of them give the pose, so that no search is
-// needed, and the warps meet them. They are not proposed again.
+// needed, and the warps meet them. They are not proposed again. `lies` narrows the search
+// otherwise.
 //
-// Points that are no good for a face are not proposed (suggestion_check.h); their sites are absent.
+// Points that are no good for a face are not proposed (suggestion_check.h). The bone that is met
+// first from outside takes their place, if it is within 8 mm of the prediction; otherwise the site
+// is absent.
 //
 // Throws InputError if there is no reference, if the mesh is not a head's (mesh_check.h), if it
 // holds two skulls, if its shape does not determine its pose or the known sites do not fit it, if
 // fewer than six sites are found, or if the sides came out exchanged.
 Proposal ProposeLandmarks(const TriMesh& skull, const std::string& name,
                           std::span<const ReferenceHead> references, const RunContext& context,
-                          std::span<const SitePoint> known = {});
+                          std::span<const SitePoint> known = {},
+                          SkullLies lies = SkullLies::kAnyhow);
 
 // The same with the mean skull as the only reference, which its modes shape like the subject before
 // the warp.
 Proposal ProposeLandmarks(const TriMesh& skull, const std::string& name, const MeanSkull& mean,
-                          const RunContext& context, std::span<const SitePoint> known = {});
+                          const RunContext& context, std::span<const SitePoint> known = {},
+                          SkullLies lies = SkullLies::kAnyhow);
 
 // The proposal as a landmark file in the frame of the skull's file. `proposed` is set; each
 // landmark has a certainty and a note that explains it.

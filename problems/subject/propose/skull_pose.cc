@@ -280,7 +280,8 @@ Similarity StepTowards(const std::vector<ShellMatch>& matches, bool scale_too) {
   return step;
 }
 
-SkullPose FindPose(const SkullShell& reference, const SkullShell& skull, int threads) {
+SkullPose FindPose(const SkullShell& reference, const SkullShell& skull, int threads,
+                   SkullLies lies) {
   const SkullShell from = AsShell(ClusterVertices(reference.mesh, kSearchCell_mm));
   const SkullShell to = AsShell(ClusterVertices(skull.mesh, kSearchCell_mm));
   const auto refine = [&](const Stage& stage, const std::vector<Similarity>& poses) {
@@ -288,7 +289,7 @@ SkullPose FindPose(const SkullShell& reference, const SkullShell& skull, int thr
   };
   const ShellPair coarse(from, to, kFirst.cell_mm);
   std::vector<Candidate> some = refine(kMiddle, UprightStarts(coarse));
-  if (!IsPlain(some)) {
+  if (lies == SkullLies::kAnyhow && !IsPlain(some)) {
     some = refine(kMiddle, FirstPoses(refine(kFirst, Starts(coarse)), kMiddle.poses));
   }
   constexpr int kRoundsToRest = 40;

@@ -39,6 +39,10 @@ struct SkullPose {
   double rival_misfit_mm = kNaN;
 };
 
+// Says whether the search of the pose may assume an upright skull. A mesh may lie anyhow; the
+// header of a CT states the axes, so its skull is upright.
+enum class SkullLies { kAnyhow, kUpright };
+
 // Finds the pose by trimmed ICP in both directions with scale. Most files lie upright, in LPS or
 // RAS, so these two are tried first; if one of them fits well and much better than the other, it is
 // the pose. Otherwise the search begins from 144 starts. The rotations of
@@ -46,8 +50,10 @@ struct SkullPose {
 // the files on each other; all are proper, so that sides are never exchanged. Each is shifted along
 // z by 0, 35 and -35 mm, for skulls without a mandible or a vault. All starts are refined on few
 // points, the best twelve on more points, and the best of these on many points until it rests. The
-// reference must have z up. The scale stays within 0.7 ... 1.4.
-SkullPose FindPose(const SkullShell& reference, const SkullShell& skull, int threads);
+// reference must have z up. The scale stays within 0.7 ... 1.4. With kUpright, only LPS and RAS are
+// tried: neck, masks and cropped heads make a search from all starts find worse poses.
+SkullPose FindPose(const SkullShell& reference, const SkullShell& skull, int threads,
+                   SkullLies lies = SkullLies::kAnyhow);
 
 // Refines a nearly right pose by the points p, in the reference's frame, for which counts(p) is
 // true.

@@ -28,15 +28,14 @@ class PopulationCommand : public ::testing::Test {
                                     title, count));
   }
 
-  // Heads without landmarks, for which none can be proposed.
-  void WriteUnmarkedHeads(int count) {
+  // Folders that cannot be measured.
+  void WriteHeadsWithoutSkin(int count) {
     for (int k = 1; k <= count; ++k) {
       const Phantom phantom =
           MakePhantom({.random_seed = static_cast<std::uint64_t>(k), .rings = 16});
       const fs::path head = folder_ / "heads" / ("s" + std::to_string(k));
       fs::create_directories(head);
       WriteFileAtomically(head / "skull.ply", EncodeMesh(phantom.skull, ".ply"));
-      WriteFileAtomically(head / "skin.ply", EncodeMesh(phantom.face, ".ply"));
     }
   }
 
@@ -44,19 +43,21 @@ class PopulationCommand : public ::testing::Test {
 };
 
 TEST_F(PopulationCommand, TooFewSubjectsAreNotUsableAndEachFailureIsPrinted) {
-  WriteUnmarkedHeads(3);
+  WriteHeadsWithoutSkin(3);
   const testing::Outcome outcome = Call("heads --out out");
   EXPECT_EQ(outcome.code, 1) << outcome.err;
   for (const char* name : {"s1", "s2", "s3"}) {
-    EXPECT_THAT(outcome.out, HasSubstr(fmt::format("failed: {}: it has no landmarks", name)));
+    EXPECT_THAT(outcome.out,
+                HasSubstr(fmt::format("failed: {}: it has a skull and no skin", name)));
   }
   EXPECT_THAT(outcome.out, HasSubstr("no table: heads: 0 subjects are measured (3 failed"));
-  EXPECT_THAT(ReadFileBytes(folder_ / "out/subjects.csv"), HasSubstr(",failed,\"it has no"));
+  EXPECT_THAT(ReadFileBytes(folder_ / "out/subjects.csv"),
+              HasSubstr(",failed,it has a skull and no skin"));
   EXPECT_FALSE(fs::exists(folder_ / "out/table.yaml"));
 }
 
 TEST_F(PopulationCommand, AShardPrintsItsOwnFailuresEachTime) {
-  WriteUnmarkedHeads(3);
+  WriteHeadsWithoutSkin(3);
   for (const char* call : {"first", "again, when they are there already"}) {
     const testing::Outcome outcome = Call("heads --out out --shard 0/2");
     EXPECT_EQ(outcome.code, 1) << call;
@@ -66,7 +67,7 @@ TEST_F(PopulationCommand, AShardPrintsItsOwnFailuresEachTime) {
 }
 
 TEST_F(PopulationCommand, ListPrintsSkippedFolders) {
-  WriteUnmarkedHeads(1);
+  WriteHeadsWithoutSkin(1);
   fs::create_directories(folder_ / "heads/scans");
   const testing::Outcome outcome = Call("heads --list");
   EXPECT_EQ(outcome.code, 0);
@@ -96,7 +97,7 @@ TEST_F(PopulationCommand, ContinuesInItsFolderAndReplacesOtherFilesOnlyWithForce
 
 // Input files are never replaced, with --force or without.
 TEST_F(PopulationCommand, NeverReplacesTheSubjectsCsvThatItReads) {
-  WriteUnmarkedHeads(3);
+  WriteHeadsWithoutSkin(3);
   WriteFileAtomically(folder_ / "heads/subjects.csv", "name,bmi\ns1,20\n");
   const testing::Outcome outcome = Call("heads --out heads --force");
   EXPECT_EQ(outcome.code, 2);

@@ -18,6 +18,8 @@
 #include "problems/subject/dowel_depths.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/phantom.h"
+#include "problems/subject/phantom_ct.h"
+#include "problems/subject/propose/mean_skull.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -60,6 +62,40 @@ void WriteHead(const fs::path& folder, std::uint64_t random_seed, bool with_land
     WriteFileAtomically(folder / "landmarks.yaml",
                         EncodeLandmarks(PhantomLandmarks(phantom, random_seed), "landmarks.yaml"));
   }
+}
+
+// Writes a phantom as a CT of coarse voxels, as NRRD.
+void WriteVolume(const fs::path& file, std::uint64_t random_seed) {
+  const CtVolume volume = VoxelisePhantom(MakePhantom({.random_seed = random_seed, .rings = 32}),
+                                          {.pixel_mm = 4, .slice_mm = 3});
+  std::string bytes = fmt::format(
+      "NRRD0004\ntype: short\ndimension: 3\nspace: left-posterior-superior\nsizes: {} {} {}\n"
+      "space directions: ({},0,0) (0,{},0) (0,0,{})\nendian: little\nencoding: raw\n"
+      "space origin: ({},{},{})\n\n",
+      volume.columns, volume.rows, volume.slices, volume.spacing_mm.x(), volume.spacing_mm.y(),
+      volume.spacing_mm.z(), volume.origin.x(), volume.origin.y(), volume.origin.z());
+  for (const std::int16_t value : volume.values) {
+    bytes += static_cast<char>(value & 0xFF);
+    bytes += static_cast<char>(value >> 8 & 0xFF);
+  }
+  WriteFileAtomically(file, bytes);
+}
+
+std::vector<std::string> NamesOf(const PopulationPlan& plan) {
+  std::vector<std::string> names;
+  for (const PopulationEntry& entry : plan.entries) {
+    names.push_back(entry.subject.name);
+  }
+  return names;
+}
+
+std::string FaultOf(const PopulationPlan& plan, const std::string& name) {
+  for (const PopulationEntry& entry : plan.entries) {
+    if (entry.subject.name == name) {
+      return entry.subject.fault;
+    }
+  }
+  return "there is no subject " + name;
 }
 
 TEST(MeasurePopulation, ContinuesWhereItStoppedAndShardsGiveTheSameBytes) {
@@ -108,6 +144,69 @@ TEST(MeasurePopulation, ContinuesWhereItStoppedAndShardsGiveTheSameBytes) {
   for (const std::string_view file : kPopulationFiles) {
     EXPECT_EQ(ReadFileBytes(folder / "a" / file), ReadFileBytes(folder / "b" / file)) << file;
   }
+}
+
+RunContext OnThreads(int threads) { return {.on_event = {}, .stop_token = {}, .threads = threads}; }
+
+// A phantom is no human skull, so the landmarks come from another phantom.
+TEST(MeasurePopulation, OfVolumesInAFolderGoesOnAfterBadOnesAndShardsGiveTheSameTable) {
+  const ScratchFolder folder;
+  fs::create_directories(folder / "heads/d");
+  for (const auto& [file, seed] : {std::pair{"a.nrrd", 1}, {"b.nrrd", 2}, {"c.nrrd", 3}}) {
+    WriteVolume(folder / "heads" / file, seed);
+  }
+  WriteFileAtomically(folder / "heads/bad.nrrd", "NRRD0004\nsizes: many\n");
+  WriteFileAtomically(folder / "heads/d/skull.ply", "ply\n");
+  WriteHead(folder / "reference", 9, /*with_landmarks=*/true);
+  WriteFileAtomically(folder / "heads/population.yaml",
+                      "measure: {dense: {columns: 8, rows: 8, modes: 0}, references: [{skull: "
+                      "../reference/skull.ply, landmarks: ../reference/landmarks.yaml}]}\n");
+  const PopulationPlan plan = ReadPopulation(folder / "heads");
+  const PopulationRunSummary whole =
+      MeasurePopulation(plan, folder / "whole", {.jobs = 2}, OnThreads(1));
+  EXPECT_EQ(whole.done, 3);
+  EXPECT_EQ(whole.failed, 2);
+  const PopulationResult result = Analysed(plan, folder / "whole");
+  EXPECT_THAT(result.subjects.at(2).reason, HasSubstr("bad.nrrd"));
+  EXPECT_THAT(result.subjects.at(4).reason, HasSubstr("it has a skull and no skin"));
+  EXPECT_GT(result.table.rows.size(), 10u);
+  MeasurePopulation(plan, folder / "parts", {.shard = 0, .shards = 2}, OnThreads(3));
+  MeasurePopulation(plan, folder / "other", {.shard = 1, .shards = 2}, OnThreads(2));
+  GatherSubjects(plan, folder / "parts", {folder / "other"});
+  OutputFolder out(folder / "whole", WhenNotEmpty::kReplaceFiles),
+      gathered(folder / "parts", WhenNotEmpty::kReplaceFiles);
+  WritePopulation(result, out);
+  WritePopulation(Analysed(plan, folder / "parts"), gathered);
+  for (const std::string_view file : kPopulationFiles) {
+    EXPECT_EQ(ReadFileBytes(folder / "whole" / file), ReadFileBytes(folder / "parts" / file))
+        << file;
+  }
+}
+
+// The mean skull is upright; its own shape, made larger, is its skin.
+TEST(MeasurePopulation, WithoutAnyReferenceTheMeanSkullProposesTheLandmarks) {
+  const ScratchFolder folder;
+  const TriMesh skull = ReadMeanSkull().head.shell.mesh;
+  TriMesh skin = skull;
+  const Vec3 middle = Bounds(skull).center();
+  for (Vec3& p : skin.points) {
+    p = middle + 1.12 * (p - middle);
+  }
+  fs::create_directories(folder / "heads/a");
+  WriteFileAtomically(folder / "heads/a/skull.ply", EncodeMesh(skull, ".ply"));
+  WriteFileAtomically(folder / "heads/a/skin.ply", EncodeMesh(skin, ".ply"));
+  const PopulationPlan plan = ReadPopulation(folder / "heads");
+  MeasurePopulation(plan, folder / "out", {}, {});
+  const MeasuredSubject measured = ReadMeasured(plan, folder / "out").at(0);
+  ASSERT_EQ(measured.status, "done") << measured.reason;
+  EXPECT_TRUE(measured.depths.proposed);
+  EXPECT_EQ(measured.depths.sites.size(), 32u);  // those without a depth state why
+  int with_depth = 0;
+  for (const SiteDepth& site : measured.depths.sites) {
+    EXPECT_EQ(std::isfinite(site.depth_mm), site.why_not.empty()) << site.site;
+    with_depth += std::isfinite(site.depth_mm) ? 1 : 0;
+  }
+  EXPECT_GT(with_depth, 15);
 }
 
 // The depths of phantoms are known; their coarse meshes have small errors.
@@ -392,8 +491,37 @@ TEST(ReadPopulation, OfAFolderAcceptsCapitalsAndNotesSkippedFolders) {
   EXPECT_EQ(std::get<CtSubject>(plan.entries[1].subject.subject).volume, folder / "heads/b/CT");
   EXPECT_THAT(plan.notes, ElementsAre(HasSubstr("c: skipped")));
   WriteFileAtomically(folder / "heads/a/skin.PLY", "");
-  EXPECT_THAT(WordsOf<InputError>([&] { ReadPopulation(folder / "heads"); }),
+  EXPECT_THAT(FaultOf(ReadPopulation(folder / "heads"), "a"),
               HasSubstr("both SKIN.ply and skin.PLY are there; keep one"));
+}
+
+TEST(ReadPopulation, VolumesInAFolderAreSubjectsAndOtherFilesAreNot) {
+  const ScratchFolder folder;
+  WriteHead(folder / "heads/f", 1, /*with_landmarks=*/true);
+  for (const char* file : {"a.nrrd", "b.NII.GZ", "c.mhd", "c.raw", "d.1.inv3", "README.md",
+                           "LICENSE.open-kbp", "depths.csv", "volume.txt", ".hidden.nrrd"}) {
+    WriteFileAtomically(folder / "heads" / file, "");
+  }
+  fs::create_symlink("nowhere", folder / "heads/e.nii");
+  WriteFileAtomically(folder / "heads/population.yaml", "import: {skin_hu: -450}\n");
+  const PopulationPlan plan = ReadPopulation(folder / "heads");
+  EXPECT_THAT(NamesOf(plan), ElementsAre("a", "b", "c", "d.1", "e", "f"));
+  EXPECT_EQ(std::get<CtSubject>(plan.entries[1].subject.subject).volume, folder / "heads/b.NII.GZ");
+  EXPECT_EQ(std::get<CtSubject>(plan.entries[1].subject.subject).import.skin_hu, -450);
+  EXPECT_THAT(plan.notes, ElementsAre());
+}
+
+TEST(ReadPopulation, RefusesTwoEntriesOfOneName) {
+  const ScratchFolder folder;
+  fs::create_directories(folder / "heads");
+  WriteFileAtomically(folder / "heads/a.nrrd", "");
+  WriteFileAtomically(folder / "heads/a.nii.gz", "");
+  const auto words = [&] { return WordsOf<InputError>([&] { ReadPopulation(folder / "heads"); }); };
+  EXPECT_THAT(words(), HasSubstr("heads: a.nii.gz and a.nrrd are both the subject 'a'; rename"));
+  fs::remove(folder / "heads/a.nii.gz");
+  EXPECT_THAT(NamesOf(ReadPopulation(folder / "heads")), ElementsAre("a"));
+  WriteHead(folder / "heads/a", 1, /*with_landmarks=*/true);
+  EXPECT_THAT(words(), HasSubstr("a and a.nrrd are both the subject 'a'"));
 }
 
 TEST(ReadPopulation, RefusesFaultyRowsOfSubjectsCsv) {
@@ -429,7 +557,7 @@ TEST(ReadPopulation, OfAFolderReadsItsSubjectsAndTheirCovariates) {
   EXPECT_FALSE(plan.entries[1].subject.sex.has_value());
   EXPECT_EQ(plan.file.measure.references.size(), 2u);
   fs::remove(folder / "head2/skin.ply");
-  EXPECT_THAT(WordsOf<InputError>([&] { ReadPopulation(folder.Path()); }),
+  EXPECT_THAT(FaultOf(ReadPopulation(folder.Path()), "head2"),
               HasSubstr("it has a skull and no skin"));
 }
 
