@@ -106,11 +106,11 @@ std::vector<KnownDepth> KnownDepths(const PopulationDepth& options, const People
   return known;
 }
 
-// The tissue outside the filled skull. At least 1 mm is left, as for dowels there, because an
-// implicit surface has holes over thinner tissue.
-double OutsideGap(double from_bone_mm, double gap_mm) {
-  constexpr double kLeast_mm = 1;
-  return std::max(from_bone_mm - gap_mm, std::min(from_bone_mm, kLeast_mm));
+// The tissue outside the filled skull. A skull is filled below the skin, so at least half of the
+// depth between the dowels is left; an implicit surface has holes over tissue thinner than its
+// cells.
+double OutsideGap(double from_bone_mm, double gap_mm, double between_dowels_mm) {
+  return std::max(from_bone_mm - gap_mm, std::min(from_bone_mm, between_dowels_mm / 2));
 }
 
 // The process given the dowels.
@@ -132,8 +132,8 @@ class Conditioned {
     weights_ = factor_.solve(surprise);
   }
 
-  // Depth on the skull, and its deviation.
-  DepthValue At(const Expected& place) const {
+  // Depth on the skull, and its deviation. between_dowels_mm: interpolated there without people.
+  DepthValue At(const Expected& place, double between_dowels_mm) const {
     const auto n = static_cast<Eigen::Index>(known_.size());
     Eigen::VectorXd to_known(n);
     for (Eigen::Index k = 0; k < n; ++k) {
@@ -141,7 +141,7 @@ class Conditioned {
     }
     const double from_bone_mm = std::exp(place.depth.mean + to_known.dot(weights_));
     const double variance = place.depth.sd * place.depth.sd - to_known.dot(factor_.solve(to_known));
-    return {OutsideGap(from_bone_mm, place.gap_mm),
+    return {OutsideGap(from_bone_mm, place.gap_mm, between_dowels_mm),
             from_bone_mm * std::sqrt(std::max(0.0, variance))};
   }
 
@@ -180,7 +180,7 @@ DepthField InterpolateDepth(const PopulationDepth& options, const DepthInput& in
   return AssignWhereFacing(input, samples, options.max_angle_deg, run, [&](std::size_t i) {
     const Expected place = expectation.At(input.skull.points[i], input.normals[i]);
     const double share = ShareOfFallback(place.nearest_mm, options.reach_mm);
-    const DepthValue own = person.At(place);
+    const DepthValue own = person.At(place, beyond.depth_mm[i]);
     return DepthValue{
         limits(share < 1 ? (1 - share) * own.mm + share * beyond.depth_mm[i] : beyond.depth_mm[i]),
         share > 0 ? kNaN : own.sd_mm};

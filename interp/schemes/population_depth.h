@@ -45,11 +45,11 @@ void Fields(Visitor& visit, PopulationDepth& o) {
 // The logarithm of depth is a Gaussian process whose mean, deviation and loading on build are
 // people's (CarryToSubject), and whose dowels are known up to `error` and their own sd_mm
 // (docs/explanation/mathematics-depth.md). Depth counts from the bone; where the skull was filled,
-// the gap is taken off, down to 1 mm, so that tissue over the temporal fossa has its own depth.
-// sd_mm is the process's where people reach, and NaN beyond. Depths are above a tenth of the
-// smallest dowel's and may leave the dowels' range. If CarryToSubject finds a fault, the field is
-// radial_basis's, with a note and a share. kNotFacing as in AssignWhereFacing. Throws InputError as
-// CheckDepthInput does, or if the skull has no triangle.
+// the gap is taken off, down to half of radial_basis's depth, so that tissue over the temporal
+// fossa has its own depth. sd_mm is the process's where people reach, and NaN beyond. Depths are
+// above a tenth of the smallest dowel's and may leave the dowels' range. If CarryToSubject finds a
+// fault, the field is radial_basis's, with a note and a share. kNotFacing as in AssignWhereFacing.
+// Throws InputError as CheckDepthInput does, or if the skull has no triangle.
 DepthField InterpolateDepth(const PopulationDepth& options, const DepthInput& input,
                             const RunContext& run);
 

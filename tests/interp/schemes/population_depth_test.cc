@@ -229,12 +229,16 @@ TEST(PopulationDepth, TheGapOfAFilledSkullIsTakenOff) {
   EXPECT_NEAR(UpperMedian(taken_off_mm), kGap_mm, 1);
 }
 
-TEST(PopulationDepth, AMillimetreIsLeftWhereTheGapIsDeeperThanTheTissue) {
+TEST(PopulationDepth, HalfOfTheDepthBetweenDowelsIsLeftWhereTheGapIsDeeperThanTheTissue) {
   const Person bone;
+  const Person filled = Filled(bone, 9, [](std::size_t) { return true; });
+  const DepthField field = filled.Depth();
+  const DepthField between =
+      InterpolateDepth(RadialBasis{.max_angle_deg = 90}, filled.Input(), RunContext{});
   int at_least = 0;
-  for (const double depth_mm : Filled(bone, 9, [](std::size_t) { return true; }).Depth().depth_mm) {
-    EXPECT_FALSE(depth_mm < 0.99) << depth_mm;  // without a depth where the bone turns away
-    at_least += std::abs(depth_mm - 1) < 0.01;
+  for (std::size_t v = 0; v < field.depth_mm.size(); ++v) {
+    EXPECT_FALSE(field.depth_mm[v] < 1) << field.depth_mm[v];  // NaN where the bone turns away
+    at_least += std::abs(field.depth_mm[v] - between.depth_mm[v] / 2) < 1e-9;
   }
   EXPECT_GT(at_least, 20);
 }
