@@ -62,7 +62,7 @@ struct Carried {
   std::vector<Vec3> points, normals;
 };
 
-// Where the people's sites stand on the subject, by site code.
+// Finds where the people's sites stand on the subject, by site code.
 std::map<std::string, Vec3> KnownSites(const People& people, const DepthInput& input) {
   std::map<std::string, Vec3> seen;
   for (const std::span<const Dowel> dowels : {input.expected, input.dowels}) {
