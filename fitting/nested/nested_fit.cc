@@ -90,6 +90,7 @@ constexpr std::size_t kPatchesPerPoint = 4;  // of a tested level; more take tim
 // Ratio of neighbouring weights in the search, in rounds and in the final fit: solves against a
 // closer weight. The score is flat near its minimum.
 constexpr double kCoarseFactor = 4, kFineFactor = 2;
+constexpr std::size_t kResidualsAtOnce = 1 << 14;  // points; bounds the memory
 // Held-out error, relative to the extent, that is round-off: mean squares are differences of sums.
 constexpr double kRounding = 1e-8;
 
@@ -337,9 +338,7 @@ class NestedFitter {
     }
     SearchMetric(search, scan);
     const double between = search.Between();
-    is_rounded_below_ =
-        search.Finish().NoiseSquare(static_cast<double>(count)) < least_noise_square_;
-    const NestedWeight chosen = search.SmoothTo(least_noise_square_);
+    const NestedWeight chosen = SmoothWithinRounding(search, count);
     between_ = is_rounded_below_ ? chosen.weight : between;
     least_gain_ = search.least_gain();
     if (std::isnan(chosen.weight)) {
@@ -446,6 +445,36 @@ class NestedFitter {
     const bool is_rounded = points_.lattice_mm > 0 && points_.channels == 1 && !points_.weighted &&
                             std::abs(points_.axes(2, 0)) > kAlongZ && !LieAlongLines(points_);
     return is_rounded ? points_.lattice_mm * points_.lattice_mm / 12 : 0;
+  }
+
+  // Takes the largest weight at which the points still lie within half a step of the lattice, as
+  // far as any does, if the search has chosen less noise than rounding makes. Errors of rounding
+  // follow the surface, so their size alone does not show how smooth it is: it is less than step /
+  // sqrt(12) where the surface stays within a step.
+  NestedWeight SmoothWithinRounding(NestedWeightSearch& search, std::size_t count) {
+    const NestedWeight found = search.Finish();
+    is_rounded_below_ = found.NoiseSquare(static_cast<double>(count)) < least_noise_square_;
+    return is_rounded_below_ ? search.SmoothWhileFits([this] { return BeyondRounding(); }) : found;
+  }
+
+  // The mean square, over the inliers, of what residuals exceed half a step of the lattice by.
+  double BeyondRounding() {
+    const double half_mm = points_.lattice_mm / 2;
+    double sum = 0;
+    std::size_t count = 0;
+    NestedResiduals residuals(solve_);
+    for (std::size_t begin = 0; begin < points_.size(); begin += kResidualsAtOnce) {
+      const std::size_t end = std::min(begin + kResidualsAtOnce, points_.size());
+      const std::span<const Residual> some = residuals.Of(begin, end);
+      for (std::size_t k = begin; k < end; ++k) {
+        if (outlier_[k] == 0) {
+          const double beyond = std::max(std::sqrt(some[k - begin].Square()) - half_mm, 0.0);
+          sum += beyond * beyond;
+          ++count;
+        }
+      }
+    }
+    return sum / static_cast<double>(std::max<std::size_t>(count, 1));
   }
 
   // Returns whether cross-validation would follow the rounding; finer vertices would only do so
@@ -602,7 +631,6 @@ class NestedFitter {
 
   // Computes the distances and their statistics, in the order of the curve (invariant 8).
   void Measure(NestedFitResult& result) {
-    constexpr std::size_t kAtOnce = 1 << 14;  // points; bounds the memory
     double sum = 0, weights = 0;
     result.residual_mm.resize(points_.GivenSize());
     NestedResiduals residuals(solve_);
@@ -610,8 +638,8 @@ class NestedFitter {
     const FileRuns runs = FindFileRuns(points_);
     DesignEffect effect(runs);
     std::optional<Residual> last;
-    for (std::size_t begin = 0; begin < points_.size(); begin += kAtOnce) {
-      const std::size_t end = std::min(begin + kAtOnce, points_.size());
+    for (std::size_t begin = 0; begin < points_.size(); begin += kResidualsAtOnce) {
+      const std::size_t end = std::min(begin + kResidualsAtOnce, points_.size());
       const std::span<const Residual> some = residuals.Of(begin, end);
       for (std::size_t k = begin; k < end; ++k) {
         const double square = some[k - begin].Square();
@@ -695,7 +723,7 @@ class NestedFitter {
     } else {
       chosen = search.FinalSolve(known);
     }
-    chosen = search.SmoothTo(least_noise_square_);
+    chosen = SmoothWithinRounding(search, count);
     weight_ = std::isnan(chosen.weight) ? weight_ : chosen.weight;
     return chosen;
   }

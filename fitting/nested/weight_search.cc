@@ -196,12 +196,25 @@ void NestedWeightSearch::Take(double weight) {
   Try(weight);
 }
 
-NestedWeight NestedWeightSearch::SmoothTo(double least_square) {
+NestedWeight NestedWeightSearch::SmoothWhileFits(const std::function<double()>& misfit) {
   constexpr double kFactor = 2;
+  // Largest misfit, relative to its least: distances twice as large. Larger values smooth too much,
+  // smaller ones follow the rounding. It was tried on Franke's function, waves and hills of heights
+  // 10 and 30, rounded to whole numbers, with 1e4 and 1e5 points.
+  constexpr double kNearLeast = 4;
   const double smoothest = kMaxWeightRatio * solve_.EvenWeight();
-  while (best_.NoiseSquare(count_) < least_square && best_.weight * kFactor < smoothest) {
-    Take(best_.weight * kFactor);
+  Finish();
+  double least = misfit(), weight = best_.weight;
+  for (double next = weight * kFactor; next < smoothest; next *= kFactor) {
+    Take(next);
+    const double square = misfit();
+    least = std::min(least, square);
+    if (square > kNearLeast * least) {
+      break;
+    }
+    weight = next;
   }
+  Take(weight);
   return Finish();
 }
 

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <map>
 
 #include "fitting/nested/nested_solve.h"
@@ -57,8 +58,9 @@ class NestedWeightSearch {
   double Between() const;
   // Solves with this weight, more accurately than for comparisons, and makes it the best.
   NestedWeight FinalSolve(double weight);
-  // Takes larger weights until the noise of a point along one axis is at least this, mm^2.
-  NestedWeight SmoothTo(double least_square);
+  // Takes the largest weight at which the misfit of the solve's present solution, a mean square, is
+  // still near its least. For a misfit that both rough and smooth surfaces make large.
+  NestedWeight SmoothWhileFits(const std::function<double()>& misfit);
   int steps() const { return steps_; }
   double least_gain() const { return least_gain_; }  // for the next search
 

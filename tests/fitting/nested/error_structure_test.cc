@@ -87,6 +87,19 @@ TEST(ErrorStructure, RoundedHeightsAreNotFollowed) {
   EXPECT_LT(ErrorOf(fit.surface), 0.25 * kStep / std::sqrt(12));
 }
 
+// Many points and few steps: errors of rounding follow the surface, so they are smaller than those
+// of independent heights, and a surface with residuals of step / sqrt(12) is too smooth.
+TEST(ErrorStructure, CoarselyRoundedHeightsAreNotSmoothedTooMuch) {
+  Random random(7);
+  Points rounded;
+  constexpr double kStep = 0.25;
+  for (int k = 0; k < 100000; ++k) {
+    const Vec2 at(random.Uniform(0, 1), random.Uniform(0, 1));
+    rounded.Add(at, kStep * std::round((Hills(at) + 0.001 * random.Normal()) / kStep));
+  }
+  EXPECT_LT(ErrorOf(rounded.Fit().surface), 0.25 * kStep / std::sqrt(12));
+}
+
 // Points of contours have few heights, which are exact.
 TEST(ErrorStructure, ContoursLieAlongLines) {
   Random random(3);
