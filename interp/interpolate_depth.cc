@@ -11,7 +11,8 @@ namespace {
 // A choice that is no scheme of the dowels alone.
 template <class Scheme>
 constexpr bool IsApart =
-    std::is_same_v<Scheme, PopulationDepth> || std::is_same_v<Scheme, DepthMap>;
+    std::is_same_v<Scheme, PopulationDepth> || std::is_same_v<Scheme, DepthMap> ||
+    std::is_same_v<Scheme, ExternalScheme>;
 
 }  // namespace
 
@@ -31,6 +32,8 @@ bool NeedsSurface(const DepthScheme& scheme) {
           return true;
         } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
           return false;
+        } else if constexpr (std::is_same_v<Scheme, ExternalScheme>) {
+          return options.function && options.function->needs_surface;
         } else {
           return SingleNeedsSurface(options);
         }
@@ -59,6 +62,8 @@ bool NeedsNetwork(const DepthScheme& scheme) {
         using Scheme = std::decay_t<decltype(options)>;
         if constexpr (std::is_same_v<Scheme, AutoScheme>) {
           return std::ranges::all_of(options.schemes, SingleNeedsNetwork);
+        } else if constexpr (std::is_same_v<Scheme, ExternalScheme>) {
+          return options.function && options.function->needs_network;
         } else if constexpr (IsApart<Scheme>) {
           return false;
         } else {
@@ -79,7 +84,8 @@ std::size_t FewestDowels(const DepthScheme& scheme) {
                      : std::ranges::min(schemes | std::views::transform(SingleFewestDowels));
         } else if constexpr (std::is_same_v<Scheme, PopulationDepth>) {
           return 6;
-        } else if constexpr (std::is_same_v<Scheme, DepthMap>) {
+        } else if constexpr (std::is_same_v<Scheme, DepthMap> ||
+                             std::is_same_v<Scheme, ExternalScheme>) {
           return 1;
         } else {
           return SingleFewestDowels(options);

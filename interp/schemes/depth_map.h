@@ -22,7 +22,8 @@ void Fields(Visitor& visit, DepthMap& o) {
   visit(FieldInfo{.name = "file",
                   .doc = "depth per vertex: a PLY whose vertices have the scalar, e.g. depth.ply "
                          "of a run, or a CSV with the scalar's name in its first line and a line "
-                         "per vertex; above 0, or nan for no depth"},
+                         "per vertex; above 0, or nan for no depth. In a study {subject} stands for the "
+                         "subject's name, e.g. maps/{subject}.ply"},
         o.file);
   visit(FieldInfo{.name = "scalar", .doc = "name of the PLY's vertex property or the CSV's column"},
         o.scalar);
@@ -36,6 +37,14 @@ void Fields(Visitor& visit, DepthMap& o) {
                   .max = 100,
                   .doc = "vertices further than this from the map's mesh get no depth"},
         o.reach_mm);
+}
+template <class Report>
+void CheckValue(Report& report, const DepthMap& o) {
+  if (o.file.empty()) {
+    report("file",
+           "no file is named; give a PLY or CSV with a depth per vertex, in a study e.g. "
+           "maps/{subject}.ply");
+  }
 }
 
 // Gives each vertex the map's depth at the closest point of its mesh, linear in the triangle. The

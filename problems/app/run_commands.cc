@@ -38,6 +38,7 @@
 #include "problems/report/run_report.h"
 #include "problems/study/depth_study.h"
 #include "problems/study/report/study_report.h"
+#include "problems/study/study_metrics.h"
 #include "problems/study/study_plan.h"
 #include "surfaces/base/error.h"
 #include "surfaces/decimate/decimate.h"
@@ -51,7 +52,7 @@ namespace {
 struct Arguments : WorkOptions {
   std::vector<std::string> files;
   bool schema = false, without_inputs = false;
-  std::string options_of = "experiment";
+  std::string options_of = "experiment", job = "face";
   std::string config, landmarks;
   std::vector<std::string> exclude;
   CtImportOptions ct;
@@ -314,8 +315,23 @@ std::string OptionsText(bool schema) {
   return schema ? OptionsSchema<Options>() : OptionsReference<Options>();
 }
 
+// Prints the numbers that a study can rank by.
+int PrintMetrics(const Arguments& arguments) {
+  if (arguments.schema) {
+    throw InputError("options metrics: metrics have no schema; leave --schema out");
+  }
+  const auto job = arguments.job == "depth"      ? StudyJob::kDepth
+                   : arguments.job == "identify" ? StudyJob::kIdentify
+                                                 : StudyJob::kFace;
+  fmt::print("{}", MetricsText(job));
+  return kDone;
+}
+
 int OptionsCommand(const Arguments& arguments) {
   const bool schema = arguments.schema;
+  if (arguments.options_of == "metrics") {
+    return PrintMetrics(arguments);
+  }
   fmt::print("{}", arguments.options_of == "population" ? OptionsText<PopulationFile>(schema)
                    : arguments.options_of == "study"    ? OptionsText<StudyFile>(schema)
                    : arguments.options_of == "fit"      ? OptionsText<PointFitOptions>(schema)
@@ -500,8 +516,15 @@ void DeclareCheck(CLI::App& command, CommandLine& line) {
 
 void DeclareOptions(CLI::App& command, CommandLine& line) {
   Arguments& a = *Bind(command, line, &OptionsCommand);
-  command.add_option("KIND", a.options_of, "kind of file: experiment, study, population or fit")
-      ->check(CLI::IsMember({"experiment", "study", "population", "fit"}))
+  command
+      .add_option(
+          "KIND", a.options_of,
+          "kind of file: experiment, study, population or fit; or metrics: the numbers that "
+          "a study can rank by, with their units")
+      ->check(CLI::IsMember({"experiment", "study", "population", "fit", "metrics"}))
+      ->capture_default_str();
+  command.add_option("--job", a.job, "for metrics: the job of the study")
+      ->check(CLI::IsMember({"face", "depth", "identify"}))
       ->capture_default_str();
   command.add_flag("--schema", a.schema, "as a JSON Schema for editors");
 }

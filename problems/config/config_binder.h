@@ -121,10 +121,15 @@ void ReadVariant(ConfigErrors& errors, const ConfigItem& item, T& out,
   if (*index != out.index()) {
     out = MakeAlternative(no_value, *index);
   }
-  if (item.node.IsMap()) {
-    std::visit([&](auto& chosen) { ReadFields(errors, item, chosen, /*is_alternative=*/true); },
-               out);
-  }
+  std::visit(
+      [&](auto& chosen) {
+        if (item.node.IsMap()) {
+          ReadFields(errors, item, chosen, /*is_alternative=*/true);
+        } else {
+          CheckWhole(errors, item, chosen);
+        }
+      },
+      out);
 }
 
 // Reads an item of a list or map. A variant must name its type, as there is no default type.

@@ -226,6 +226,10 @@ Json StepsToJson(const FitResult& fit) {
   return json;
 }
 
+std::string RoleName(const Dowel& dowel) {
+  return dowel.role == PointRole::kInserted ? "inserted" : "landmark";
+}
+
 std::string TimingJson(const std::vector<StepTime>& times, std::optional<double> cpu_s) {
   Json json = {
       {"total_wall_s", 0}, {"cpu_s", cpu_s ? Json(*cpu_s) : Json()}, {"steps", Json::array()}};

@@ -47,6 +47,9 @@ nlohmann::ordered_json CrossValidationToJson(const CrossValidation& result);
 // {"levels": [...], "relaxations": [...]}. "relaxations" is missing without relaxation.
 nlohmann::ordered_json StepsToJson(const FitResult& fit);
 
+// The word for the dowel's role in a dowels.csv: "landmark" or "inserted".
+std::string RoleName(const Dowel& dowel);
+
 // timing.json of a run, a depth study, a fit of points or a trial:
 //   {"total_wall_s": sum of the steps, "cpu_s": processor time or null,
 //    "steps": [{"step": name, "wall_s": seconds}, ...] in the order in which they ran}

@@ -37,10 +37,6 @@ int TargetIndex(const FitTarget& target, const std::string& site) {
   return found == target.points.end() ? -1 : static_cast<int>(found - target.points.begin());
 }
 
-std::string RoleName(const Dowel& dowel) {
-  return dowel.role == PointRole::kInserted ? "inserted" : "landmark";
-}
-
 std::string DowelsCsv(const RunResult& result) {
   CsvWriter csv({"site", "base_x_mm", "base_y_mm", "base_z_mm", "direction_x", "direction_y",
                  "direction_z", "depth_mm", "sd_mm", "tip_x_mm", "tip_y_mm", "tip_z_mm", "u", "v",

@@ -237,6 +237,17 @@ std::string LeftOutCsv(const DepthResult& result) {
   return csv.Text();
 }
 
+std::string DepthDowelsCsv(const DepthResult& result) {
+  CsvWriter csv({"site", "base_x_mm", "base_y_mm", "base_z_mm", "direction_x", "direction_y",
+                 "direction_z", "depth_mm", "sd_mm", "tip_x_mm", "tip_y_mm", "tip_z_mm", "role"});
+  for (const Dowel& d : result.stage->subject.dowels_on_bone) {
+    const Vec3 tip = d.Tip();
+    csv.Row(d.site, d.base.x(), d.base.y(), d.base.z(), d.direction.x(), d.direction.y(),
+            d.direction.z(), d.depth_mm, d.sd_mm, tip.x(), tip.y(), tip.z(), RoleName(d));
+  }
+  return csv.Text();
+}
+
 std::string DepthText(const DepthResult& result) {
   std::string text = SharesText(result.depth) + ProcessText(result.depth);
   if (result.truth) {
@@ -285,6 +296,7 @@ void WriteDepth(const Experiment& experiment, const DepthResult& result, OutputF
                 const RunContext& context) {
   folder.Write("resolved.yaml", WriteConfig(experiment));
   folder.Write("result.json", WithPlainTexts(DepthResultJson(experiment, result)).dump(2) + "\n");
+  folder.Write("dowels.csv", DepthDowelsCsv(result));
   folder.Write("left_out.csv", LeftOutCsv(result));
   folder.Write("depth.ply", DepthPly(result));
   folder.Write("tips.ply", TipsPly(result));

@@ -47,6 +47,10 @@ nlohmann::ordered_json DepthResultJson(const Experiment& experiment, const Depth
 // error_mm, sd_mm, within_90, status. A missing value is an empty cell.
 std::string LeftOutCsv(const DepthResult& result);
 
+// Writes one line per dowel of the bone, in the columns of a run's dowels.csv without those of a
+// fit.
+std::string DepthDowelsCsv(const DepthResult& result);
+
 // Draws, as PNG, the depth on the skull's shell from two sides and, if the truth is known, the
 // error along the direction.
 std::string DepthPicture(const DepthResult& result, int threads);
@@ -54,9 +58,9 @@ std::string DepthPicture(const DepthResult& result, int threads);
 std::vector<Legend> DepthPictureLegends(bool has_truth);
 
 // The files that WriteDepth writes.
-inline constexpr std::array<std::string_view, 7> kDepthFiles = {
-    "resolved.yaml", "result.json", "left_out.csv", "depth.ply",
-    "tips.ply",      "depth.png",   "timing.json"};
+inline constexpr std::array<std::string_view, 8> kDepthFiles = {
+    "resolved.yaml", "result.json", "dowels.csv", "left_out.csv",
+    "depth.ply",     "tips.ply",    "depth.png",  "timing.json"};
 
 // Writes kDepthFiles. depth.ply has depth, sd, true depths and errors per vertex; tips.ply is the
 // shell moved by its depth.

@@ -15,6 +15,7 @@
 //     metric: face.rms_mm              # the report ranks by it
 //     keep: summary
 //     job: face
+//     plugins: [mine.py]               # schemes and metrics in Python
 //     identify: {others: [{name: c, set: {subject.random_seed: 3}}]}   # for job: identify
 //
 // Each of grid, zip, list and sample gives rows of settings. A trial is a subject with one row of
@@ -161,6 +162,7 @@ struct StudyFile {
   TrialFiles keep = TrialFiles::kSummary;  // a run keeps some 30 MB, a summary 10 kB
   StudyJob job = StudyJob::kFace;
   std::optional<IdentifyOptions> identify;
+  std::vector<std::filesystem::path> plugins;
 };
 template <class Visitor>
 void Fields(Visitor& visit, StudyFile& o) {
@@ -194,7 +196,10 @@ void Fields(Visitor& visit, StudyFile& o) {
   visit(FieldInfo{.name = "metric",
                   .doc = "the number that the report ranks by, as a path in result.json: higher is "
                          "better for shares within a distance (face.within_2_5mm), nearest to its "
-                         "target for signed errors and coverages, lower for all others"},
+                         "target for signed errors and coverages, lower for all others; or an "
+                         "expression over such numbers (+ - * /, abs, sqrt, min, max; lower is "
+                         "better), e.g. \"face.rms_mm + 0.5 * abs(face.mean_signed_mm)\"; "
+                         "`semblance options metrics` lists the numbers"},
         o.metric);
   visit(FieldInfo{.name = "keep",
                   .doc = "files kept per trial: summary, the numbers; view, also the faces for the "
@@ -208,6 +213,10 @@ void Fields(Visitor& visit, StudyFile& o) {
                     "a run, and the rank of the face among the subjects' true faces"},
       o.job);
   visit(FieldInfo{.name = "identify", .doc = "options of job: identify"}, o.identify);
+  visit(FieldInfo{.name = "plugins",
+                  .doc = "Python files with schemes and metrics for this study, which `python3 -m "
+                         "semblance study` then runs"},
+        o.plugins);
 }
 template <class Report>
 void CheckValue(Report& report, const StudyFile& o) {

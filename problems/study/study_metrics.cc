@@ -12,6 +12,7 @@
 #include <variant>
 #include <vector>
 
+#include "problems/config/number_expression.h"
 #include "problems/config/spelling_suggestion.h"
 #include "problems/experiment/metrics/face_region.h"
 #include "problems/report/result_json.h"
@@ -19,6 +20,7 @@
 #include "problems/study/depth_study.h"
 #include "problems/study/identify_study.h"
 #include "problems/subject/sites.h"
+#include "surfaces/base/error.h"
 
 namespace semblance::problems {
 namespace {
@@ -176,10 +178,9 @@ std::string StandardSiteFault(const std::string& metric) {
                            metric, site, site, site);
 }
 
-}  // namespace
-
-std::string ComplaintAboutMetric(const std::string& metric, StudyJob job) {
-  const std::set<std::string> names = ListMetrics(job);
+// The complaint about one number.
+std::string ComplaintAboutNumber(const std::string& metric, const std::set<std::string>& names,
+                                 StudyJob job) {
   if (names.contains(metric) || IsShareWithOptions(metric, names)) {
     return "";
   }
@@ -197,10 +198,113 @@ std::string ComplaintAboutMetric(const std::string& metric, StudyJob job) {
           : fmt::format("; did you mean '{}'?", nearest));
 }
 
+// Returns true if the text has a sign of an expression. A path of result.json has none of them,
+// except in a name that a user chose.
+bool HasOperation(const std::string& metric) {
+  return metric.find_first_of("+-*/(") != metric.npos;
+}
+
+// The metric as an expression; null if it is none.
+std::unique_ptr<const NumberExpression> ReadExpression(const std::string& metric) {
+  if (!HasOperation(metric)) {
+    return nullptr;
+  }
+  try {
+    auto expression = std::make_unique<const NumberExpression>(metric);
+    return expression->IsName() ? nullptr : std::move(expression);
+  } catch (const InputError&) {
+    return nullptr;
+  }
+}
+
+// The unit that the last part of a path ends in.
+std::string_view UnitOf(const std::string& metric) {
+  constexpr auto kUnits =
+      std::to_array<std::pair<std::string_view, std::string_view>>({{"_mm", "mm"},
+                                                                    {"_mm2", "mm²"},
+                                                                    {"_cm2", "cm²"},
+                                                                    {"_cm3", "cm³"},
+                                                                    {"_deg", "deg"},
+                                                                    {"_s", "s"}});
+  for (const char* const share : {".within_", "coverage", ".shares."}) {
+    if (metric.find(share) != metric.npos) {
+      return "share";
+    }
+  }
+  const auto found =
+      std::ranges::find_if(kUnits, [&](const auto& unit) { return metric.ends_with(unit.first); });
+  return found == kUnits.end() ? std::string_view("number") : found->second;
+}
+
+}  // namespace
+
+std::string ComplaintAboutMetric(const std::string& metric, StudyJob job,
+                                 std::span<const OwnMetric> own) {
+  std::set<std::string> names = ListMetrics(job);
+  for (const OwnMetric& each : own) {
+    names.insert(each.name);
+  }
+  std::string complaint = ComplaintAboutNumber(metric, names, job);
+  if (complaint.empty() || !HasOperation(metric)) {
+    return complaint;
+  }
+  try {
+    const NumberExpression expression(metric);
+    for (const std::string& name : expression.names()) {
+      if (std::string fault = ComplaintAboutNumber(name, names, job); !fault.empty()) {
+        return fault;
+      }
+    }
+    return "";
+  } catch (const InputError& error) {
+    return error.what();
+  }
+}
+
+void CheckMetricNames(std::span<const OwnMetric> own, StudyJob job) {
+  std::set<std::string> taken;
+  const Json members = EmptyResultJson(job);
+  for (const auto& [name, value] : members.items()) {
+    taken.insert(name);
+  }
+  for (const OwnMetric& metric : own) {
+    RequirePlainWord(metric.name, "metric");
+    if (!taken.insert(metric.name).second) {
+      throw InputError(fmt::format("metric '{}': the name is taken; choose another", metric.name));
+    }
+  }
+}
+
+std::string MetricsText(StudyJob job) {
+  std::string text;
+  for (const std::string& name : ListMetrics(job)) {
+    text += fmt::format("{:<64} {}\n", name, UnitOf(name));
+  }
+  return text;
+}
+
+bool IsExpression(const std::string& metric) { return ReadExpression(metric) != nullptr; }
+
+double MetricOf(const std::map<std::string, double>& numbers, const std::string& metric) {
+  const auto number = [&](const std::string& name) {
+    const auto found = numbers.find(name);
+    return found == numbers.end() ? kNaN : found->second;
+  };
+  if (numbers.contains(metric)) {
+    return number(metric);
+  }
+  const std::unique_ptr<const NumberExpression> expression = ReadExpression(metric);
+  return expression ? expression->Value(number) : kNaN;
+}
+
 bool NeedsTrueSkin(const std::string& metric) {
   constexpr std::array kParts = {"face.", "implicit_face.", "depth_truth.", "identify.",
                                  "uncertainty.coverage"};
-  return std::ranges::any_of(kParts, [&](const char* part) { return metric.starts_with(part); });
+  const auto needs = [&](const std::string& name) {
+    return std::ranges::any_of(kParts, [&](const char* part) { return name.starts_with(part); });
+  };
+  const std::unique_ptr<const NumberExpression> expression = ReadExpression(metric);
+  return expression ? std::ranges::any_of(expression->names(), needs) : needs(metric);
 }
 
 namespace {
@@ -232,7 +336,8 @@ bool IsSigned(const std::string& metric) {
 }  // namespace
 
 Better DefaultBetter(const std::string& metric) {
-  return LastPart(metric).starts_with("within_")   ? Better::kHigher
+  return IsExpression(metric)                      ? Better::kLower
+         : LastPart(metric).starts_with("within_") ? Better::kHigher
          : IsSigned(metric) || StatedShare(metric) ? Better::kNearest
                                                    : Better::kLower;
 }
@@ -263,7 +368,7 @@ std::string Preference::TargetSuffix() const {
 
 Preference PreferenceFor(const std::string& metric, std::optional<Better> given) {
   return {.better = given.value_or(DefaultBetter(metric)),
-          .target = StatedShare(metric).value_or(0)};
+          .target = IsExpression(metric) ? 0 : StatedShare(metric).value_or(0)};
 }
 
 }  // namespace semblance::problems

@@ -3,17 +3,36 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <optional>
 #include <set>
+#include <span>
 #include <string>
 #include <string_view>
 
 #include "problems/study/study_file.h"
+#include "problems/study/study_plugins.h"
 
 namespace semblance::problems {
 
-// Returns "" if a trial of the job can have the metric, else a complaint with the nearest name.
-std::string ComplaintAboutMetric(const std::string& metric, StudyJob job);
+// Returns "" if a trial of the job can have the metric, else a complaint with the nearest name. A
+// metric is a number of result.json, one of `own`, or an expression over these
+// (config/number_expression.h).
+std::string ComplaintAboutMetric(const std::string& metric, StudyJob job,
+                                 std::span<const OwnMetric> own = {});
+
+// Throws InputError if the name of a metric is not a plain word, occurs twice, or is the name of a
+// member of result.json.
+void CheckMetricNames(std::span<const OwnMetric> own, StudyJob job);
+
+// Lists the metrics of a job as lines "path  unit", sorted, for people.
+std::string MetricsText(StudyJob job);
+
+// Returns true if the metric is an expression rather than the path of a number.
+bool IsExpression(const std::string& metric);
+
+// Computes the metric from the numbers of a trial, by dotted path. NaN if it lacks one of them.
+double MetricOf(const std::map<std::string, double>& numbers, const std::string& metric);
 
 // Returns true if the metric compares with the true skin, so that a subject without one lacks it.
 bool NeedsTrueSkin(const std::string& metric);
@@ -26,7 +45,7 @@ constexpr auto EnumNames(Better) {
 
 // Decides by the name of the metric: higher for shares within a distance (face.within_2_5mm),
 // nearest for signed errors (mean_signed_mm, bias_mm, the error of a left-out site) and for
-// coverage_50, _90 and _95, lower for all others.
+// coverage_50, _90 and _95, lower for all others and for expressions.
 Better DefaultBetter(const std::string& metric);
 
 // The better values of a metric, with the target of kNearest.

@@ -80,10 +80,26 @@ class TrialFaults {
   std::vector<std::string> lines_;
 };
 
+// Puts the subject's name into the name of a depth map's file, so that one value of a grid names a
+// file per subject.
+void NameSubjectsMap(const std::string& subject, ConfigNode& tree) {
+  constexpr std::string_view kSubject = "{subject}";
+  ConfigNode* const interp = tree.Find("interp");
+  ConfigNode* const file = interp == nullptr ? nullptr : interp->Find("file");
+  if (file == nullptr) {
+    return;
+  }
+  std::string& text = file->text;
+  for (std::size_t at = text.find(kSubject); at != text.npos;
+       at = text.find(kSubject, at + subject.size())) {
+    text.replace(at, kSubject.size(), subject);
+  }
+}
+
 // Makes a trial without an id. `axes` are the option paths that the rows of the study set.
 StudyTrial MakeTrial(const SubjectTree& subject, const StudyRow& row,
                      const std::vector<std::string>& axes, const ConfigNode& defaults,
-                     TrialFaults& faults) {
+                     const StudyPlugins& plugins, TrialFaults& faults) {
   ConfigErrors errors;
   ConfigNode tree = subject.tree;
   StudyTrial trial{"", subject.name, std::vector<std::string>(axes.size()), {}, subject.tags};
@@ -92,7 +108,8 @@ StudyTrial MakeTrial(const SubjectTree& subject, const StudyRow& row,
     const auto axis = std::find(axes.begin(), axes.end(), setting.key);
     trial.values[static_cast<std::size_t>(axis - axes.begin())] = Label(setting.value);
   }
-  trial.experiment = ReadConfigTree<Experiment>(tree, errors);
+  NameSubjectsMap(subject.name, tree);
+  trial.experiment = ReadExperimentTree(std::move(tree), plugins.schemes, errors);
   faults.Add(errors);
   if (!trial.experiment.alternatives.empty()) {
     faults.Add(
@@ -255,7 +272,7 @@ std::set<std::string> MissingFiles(const std::vector<StudyTrial>& trials) {
 }
 
 // Describes everything besides the experiment that the results of a trial depend on. Empty for
-// `job: face`.
+// `job: face` without metrics of the caller.
 std::string CommonPart(StudyPlan& plan) {
   std::string common = plan.job == StudyJob::kDepth ? "depth" : "";
   if (plan.job == StudyJob::kIdentify) {
@@ -264,6 +281,9 @@ std::string CommonPart(StudyPlan& plan) {
     for (const GalleryEntry& person : plan.gallery) {
       common += "\n" + person.name + "\n" + HashExperiment(person.experiment, plan.contents);
     }
+  }
+  for (const OwnMetric& metric : plan.own_metrics) {
+    common += fmt::format("\n{} {}", metric.name, metric.source_hash);
   }
   return common;
 }
@@ -289,10 +309,11 @@ void NameTrials(const fs::path& file, StudyPlan& plan, TrialFaults& faults) {
 }
 
 void AddTrials(const fs::path& file, const SubjectTree& subject, const std::vector<StudyRow>& rows,
-               const ConfigNode& defaults, StudyPlan& plan, TrialFaults& faults) {
+               const ConfigNode& defaults, const StudyPlugins& plugins, StudyPlan& plan,
+               TrialFaults& faults) {
   std::vector<StudyTrial> trials;
   for (const StudyRow& row : rows) {
-    trials.push_back(MakeTrial(subject, row, plan.axes, defaults, faults));
+    trials.push_back(MakeTrial(subject, row, plan.axes, defaults, plugins, faults));
   }
   const std::set<std::string> missing = MissingFiles(trials);
   if (missing.empty()) {
@@ -324,8 +345,9 @@ void AddToGallery(const fs::path& file, const SubjectTree& person, StudyPlan& pl
   }
 }
 
-void CheckMetric(const StudyFile& study, const ConfigNode& tree, ConfigErrors& errors) {
-  if (const std::string complaint = ComplaintAboutMetric(study.metric, study.job);
+void CheckMetric(const StudyFile& study, const ConfigNode& tree, const StudyPlugins& plugins,
+                 ConfigErrors& errors) {
+  if (const std::string complaint = ComplaintAboutMetric(study.metric, study.job, plugins.metrics);
       !complaint.empty()) {
     errors.Add(FindLocation(tree, "metric"), "metric", complaint);
   }
@@ -377,9 +399,25 @@ void CheckSubjects(const fs::path& file, const ConfigNode& tree, WithoutSubjects
   }
 }
 
-// Reads the study file. Throws ConfigError at once if it makes too many trials to expand.
-StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& errors) {
+// Throws ConfigError if the study names plugins that are not loaded. Without them every use of a
+// name of theirs would be a fault of its own.
+void RequireLoaded(const StudyFile& study, const fs::path& file, const ConfigNode& tree,
+                   const StudyPlugins& plugins, ConfigErrors& errors) {
+  if (!study.plugins.empty() && !plugins.are_files_loaded) {
+    errors.Add(FindLocation(tree, "plugins"), "plugins",
+               fmt::format("'{}' is written in Python, which this program does not load; run "
+                           "`python3 -m semblance study {}`",
+                           study.plugins.front().filename().string(), file.string()));
+    errors.ThrowIfAny();
+  }
+}
+
+// Reads the study file. Throws ConfigError at once if it makes too many trials to expand, or if its
+// plugins are not loaded.
+StudyFile ReadSizedFile(const fs::path& file, const StudyPlugins& plugins, ConfigNode& tree,
+                        ConfigErrors& errors) {
   StudyFile study = ReadStudyFile(file, tree, errors);
+  RequireLoaded(study, file, tree, plugins, errors);
   if (const std::string complaint = ComplaintAboutSize(study); !complaint.empty()) {
     errors.Add(tree.location, "", complaint);
     errors.ThrowIfAny();
@@ -388,23 +426,27 @@ StudyFile ReadSizedFile(const fs::path& file, ConfigNode& tree, ConfigErrors& er
 }
 
 // Makes a plan without axes and trials.
-StudyPlan MakeEmptyPlan(const StudyFile& study) {
+StudyPlan MakeEmptyPlan(const StudyFile& study, const StudyPlugins& plugins) {
   StudyPlan plan{.title = PlainText(study.title),
                  .metric = study.metric,
                  .keep = study.keep,
-                 .job = study.job};
+                 .job = study.job,
+                 .own_metrics = plugins.metrics};
   std::ranges::transform(study.tags, std::back_inserter(plan.tags), PlainText);
   return plan;
 }
 
 }  // namespace
 
-StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects) {
+StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects,
+                    const StudyPlugins& plugins) {
+  CheckSchemeNames(plugins.schemes);
   ConfigErrors errors;
   ConfigNode tree;
-  const StudyFile study = ReadSizedFile(file, tree, errors);
+  const StudyFile study = ReadSizedFile(file, plugins, tree, errors);
+  CheckMetricNames(plugins.metrics, study.job);
   const ConfigNode defaults = MakeConfigTree(Experiment{});
-  CheckMetric(study, tree, errors);
+  CheckMetric(study, tree, plugins, errors);
   TrialFaults faults;
   ConfigErrors base_errors;
   const auto [subjects, others] = SubjectReader(study, tree, defaults, base_errors).Read();
@@ -415,10 +457,10 @@ StudyPlan ReadStudy(const fs::path& file, WithoutSubjects without_subjects) {
     faults.ThrowIfAny();  // the trials would repeat the faults of their base
   }
 
-  StudyPlan plan = MakeEmptyPlan(study);
+  StudyPlan plan = MakeEmptyPlan(study, plugins);
   plan.axes = CollectAxes(rows);
   for (const SubjectTree& subject : subjects) {
-    AddTrials(file, subject, rows, defaults, plan, faults);
+    AddTrials(file, subject, rows, defaults, plugins, plan, faults);
   }
   if (study.job == StudyJob::kIdentify) {
     plan.identify = study.identify.value_or(IdentifyOptions{});

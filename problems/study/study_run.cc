@@ -44,15 +44,17 @@
 //   (3)  Unless `keep` is summary, trial.json and the results before it are synced, so that (2)
 //        holds after a power failure too. With `keep: summary` there are no other results: if
 //        trial.json is lost or empty, (1) makes the trial run again.
-//   (4)  The id of a trial is a hash of its job, its resolved experiment and the content of its
-//        input files. A trial on disk is therefore valid for every plan that contains its id: a
-//        changed study keeps the trials that it still has, and no trial becomes invalid. The
-//        contents are hashed when the study is read and compared again after each trial, because
-//        a file may change during the work. The program is not part of the id: trials of another
-//        version stay, the tables name them, and --rerun other-versions makes them again.
+//   (4)  The id of a trial is a hash of its job, its resolved experiment, the content of its
+//        input files, and the sources of the caller's scheme and metrics. A trial on disk is
+//        therefore valid for every plan that contains its id: a changed study keeps the trials that
+//        it still has, and no trial becomes invalid. The contents are hashed when the study is read
+//        and compared again after each trial, because a file may change during the work. The
+//        program is not part of the id: trials of another version stay, the tables name them, and
+//        --rerun other-versions makes them again.
 //   (5)  trial.json holds no time, host, folder or number of threads. Its bytes depend only on
 //        the trial, on the axes and `keep` of the plan, and on the program and the versions of
-//        its libraries. Everything else is in timing.json, which trial.json does not list.
+//        its libraries. Everything else is in timing.json and in traceback.txt of a caller's
+//        function that failed. trial.json lists neither.
 //   (6)  Shard i of n owns the trials k with k % n == i. Shards share no trial, hold no lock, and
 //        never read each other's trials. If two processes nevertheless run the same trial, both
 //        write the same bytes (5) by renames (2), and either order is right.
@@ -103,6 +105,9 @@ namespace {
 
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
+
+// The traceback of a caller's function that failed.
+constexpr const char* kTraceback = "traceback.txt";
 
 // The first members of trial.json.
 Json TrialHead(const StudyPlan& plan, const StudyTrial& trial) {
@@ -312,6 +317,11 @@ class StudyRunner {
           "not enough memory for this trial; run fewer trials at a time (--jobs), or lower its "
           "resolution",
           json);
+    } catch (const ExternalFailure& failure) {
+      Fail(failure.what(), json);
+      write = [traceback = failure.traceback()](OutputFolder& output) {
+        output.Write(kTraceback, traceback, Durability::kUnsynced);
+      };
     } catch (const std::exception& error) {
       Fail(error.what(), json);
     }
@@ -321,9 +331,11 @@ class StudyRunner {
     }
     AppendProvenance(trial, *plan_.contents.hashes, json);
     OutputFolder output(WritableTrialFolder(folder_, trial.id), WhenNotEmpty::kReplaceFiles);
+    fs::remove(output.Root() / kTraceback);  // of an earlier try
     write(output);
     std::vector<std::string> names = output.Written();
     std::erase(names, "timing.json");  // invariant 5
+    std::erase(names, kTraceback);
     if (!names.empty()) {
       json["files"] = ListHashes(output.Root(), names);
     }
@@ -360,11 +372,23 @@ class StudyRunner {
     return experiment;
   }
 
+  // Adds the numbers of the caller's metrics; null for NaN.
+  void AddOwnMetrics(const MeasuredTrial& trial, Json& result) const {
+    std::vector<double> values;
+    for (const OwnMetric& metric : plan_.own_metrics) {
+      values.push_back(metric.measure(trial));
+    }
+    for (std::size_t k = 0; k < values.size(); ++k) {
+      result[plan_.own_metrics[k].name] = std::isfinite(values[k]) ? Json(values[k]) : Json();
+    }
+  }
+
   Files RunFace(const StudyTrial& trial, double cpu_before_s, Json& json) {
     auto result = std::make_shared<const RunResult>(
         problems::Run(WithoutUnusedBust(trial.experiment), Quiet(), &cache_));
     SetStatus(result->Faults(), json);
     json["result"] = ResultJson(trial.experiment, *result);
+    AddOwnMetrics({.run = result.get(), .numbers = json["result"]}, json["result"]);
     return FilesOfRun(trial, result, ThreadCpu_s() - cpu_before_s);
   }
 
@@ -380,6 +404,7 @@ class StudyRunner {
         static_cast<std::size_t>(own - plan_.gallery.begin()), plan_.identify, Quiet(), cache_));
     SetStatus(result->run.Faults(), json);
     json["result"] = IdentifyResultJson(trial.experiment, *result);
+    AddOwnMetrics({.run = &result->run, .numbers = json["result"]}, json["result"]);
     return FilesOfRun(trial, {result, &result->run}, ThreadCpu_s() - cpu_before_s);
   }
 
@@ -402,6 +427,7 @@ class StudyRunner {
         std::make_shared<const DepthResult>(MeasureDepth(trial.experiment, Quiet(), &cache_));
     SetStatus(result->Faults(), json);
     json["result"] = DepthResultJson(trial.experiment, *result);
+    AddOwnMetrics({.depth = result.get(), .numbers = json["result"]}, json["result"]);
     const double cpu_s = ThreadCpu_s() - cpu_before_s;
     return [this, &trial, result, cpu_s](OutputFolder& output) {
       if (plan_.keep == TrialFiles::kRun) {

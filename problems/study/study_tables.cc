@@ -120,6 +120,19 @@ std::string FindAreaMetric(const StudyResults& results) {
   return "";
 }
 
+// Adds the study's metric to the numbers of each trial if it is an expression over them.
+void AddExpression(StudyResults& results) {
+  if (!IsExpression(results.metric)) {
+    return;
+  }
+  for (TrialRow& row : results.trials) {
+    const double value = MetricOf(row.metrics, results.metric);
+    if (std::isfinite(value)) {
+      row.metrics[results.metric] = value;
+    }
+  }
+}
+
 // Makes a row from the plan. Its numbers are read later.
 TrialRow MakeRow(const Json& trial) {
   TrialRow row;
@@ -164,6 +177,7 @@ StudyResults ReadStudyResults(const fs::path& folder, TrialCheck check) {
       }
     }
     ReadTrials(folder, check, results.trials);
+    AddExpression(results);
     results.tags = plan.value("tags", std::vector<std::string>());
     results.preference = PreferenceFor(results.metric);
   } catch (const nlohmann::json::exception&) {

@@ -109,7 +109,9 @@ void PrintSeconds(const std::string& name, const Cost& cost, double goal,
 template <std::size_t... Index>
 std::vector<DepthScheme> Schemes(std::index_sequence<Index...>) {
   std::vector<DepthScheme> schemes = {std::variant_alternative_t<Index, DepthScheme>{}...};
-  std::erase_if(schemes, [](const auto& each) { return std::holds_alternative<DepthMap>(each); });
+  std::erase_if(schemes, [](const auto& each) {
+    return std::holds_alternative<DepthMap>(each) || std::holds_alternative<ExternalScheme>(each);
+  });
   return schemes;
 }
 

@@ -30,14 +30,16 @@ std::vector<DepthScheme> Defaults(std::index_sequence<Index...>) {
   return {std::variant_alternative_t<Index, DepthScheme>{}...};
 }
 
-constexpr std::size_t kAlternatives = std::variant_size_v<DepthScheme> - 2;
+constexpr std::size_t kAlternatives = std::variant_size_v<DepthScheme> - 3;
 static_assert(
     std::is_same_v<std::variant_alternative_t<kAlternatives, DepthScheme>, PopulationDepth>);
 static_assert(std::is_same_v<std::variant_alternative_t<kAlternatives + 1, DepthScheme>, DepthMap>);
+static_assert(
+    std::is_same_v<std::variant_alternative_t<kAlternatives + 2, DepthScheme>, ExternalScheme>);
 
 // Every scheme with its defaults, except those that do not live by the dowels alone: population,
-// which needs a face's bone (population_depth_test), and a map, which comes from a file
-// (depth_map_test). Then with options that change the method.
+// which needs a face's bone (population_depth_test), a map, which comes from a file
+// (depth_map_test), and a scheme of the caller (external_scheme_test). Then with options that change the method.
 std::vector<DepthScheme> Schemes() {
   std::vector<DepthScheme> schemes = Defaults(std::make_index_sequence<kAlternatives>{});
   const DowelDistance along = DowelDistance::kGeodesic;

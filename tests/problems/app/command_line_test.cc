@@ -137,7 +137,7 @@ TEST_F(CommandLine, DepthPrintsErrorsAgainstTheTruthAndLeftOutDowels) {
   ExpectRefused("depth " + kConfigs +
                     "/phantom.yaml --out map --quiet --set subject.rings=30 "
                     "--set interp=depth_map",
-                "depth_map: no file is named");
+                "no file is named");
 }
 
 TEST_F(CommandLine, AnExistingFolderIsNotChangedWithoutForce) {
