@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The parts of the Python module `semblance`. Each adds its names; module.cc calls all of them.
+// The parts of the extension `semblance._semblance`, which the Python files of the package
+// `semblance` use. Each adds its names; module.cc calls all of them.
 #pragma once
 
 #include <pybind11/pybind11.h>
@@ -10,7 +11,7 @@
 
 namespace semblance::problems {
 
-// HSpline: evaluate, project, edit, read and write.
+// Surface: evaluate, project, edit, read and write.
 void BindSurface(pybind11::module_& module);
 // fit(): an H-spline through scattered points.
 void BindFit(pybind11::module_& module);

@@ -1,20 +1,28 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
+#include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
+#include <memory>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
 
 #include "problems/app/python/bindings.h"
+#include "problems/app/python/plugins.h"
 #include "problems/app/python/values.h"
 #include "problems/experiment/experiment_config.h"
+#include "problems/experiment/external_schemes.h"
 #include "problems/experiment/input_files.h"
 #include "problems/io/staged_folder.h"
+#include "problems/report/report_kit.h"
 #include "problems/report/result_json.h"
 #include "problems/report/run_folder.h"
+#include "problems/report/scene_json.h"
 #include "problems/run.h"
+#include "problems/study/report/study_ranking.h"
 #include "problems/study/report/study_report.h"
 #include "problems/study/study_run.h"
 #include "surfaces/base/error.h"
@@ -25,27 +33,28 @@ namespace {
 namespace py = pybind11;
 namespace fs = std::filesystem;
 
-std::vector<std::string> Overrides(const py::dict& set) {
-  std::vector<std::string> overrides;
-  for (const auto& [path, value] : set) {
-    overrides.push_back(std::string(py::str(path)) + "=" + OptionText(value));
-  }
-  return overrides;
-}
-
 WhenNotEmpty MakePolicy(bool force) {
   return force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse;
 }
 
-py::object FromJson(const std::string& text) {
-  return py::module_::import("json").attr("loads")(text);
+// A page with the 3-D view of a run alone.
+std::string ViewPage(const std::string& title, const RunResult& result) {
+  Report report;
+  report.title = title;
+  report.faults = result.Faults();
+  report.scenes = CollectScenes({{result.subject.name, SceneJson(result, {})}}, 0).json;
+  return ReportHtml(report);
 }
 
-// Runs an experiment and returns result.json, the surface and the faults of the result.
-py::dict RunConfig(const std::string& config, const py::dict& set,
-                   const std::optional<std::string>& out, bool force, int threads) {
-  const auto experiment = ReadConfig<Experiment>(config, Overrides(set));
-  const RunResult result = Interruptible([&](const std::stop_token& stop) {
+// Runs an experiment and returns the text of result.json, the arrays, the faults, and a function
+// that makes a page with the 3-D view.
+py::dict RunConfig(const std::string& config, const std::vector<std::string>& overrides,
+                   const std::optional<std::string>& out, bool force, int threads,
+                   const py::iterable& schemes) {
+  const std::vector<NamedScheme> named = ReadSchemes(schemes);
+  CheckSchemeNames(named);
+  const Experiment experiment = ReadExperiment(config, overrides, named);
+  auto result = Interruptible([&](const std::stop_token& stop) {
     RunContext context;
     context.threads = threads;
     context.stop_token = stop;
@@ -53,38 +62,38 @@ py::dict RunConfig(const std::string& config, const py::dict& set,
     if (out) {
       folder.emplace(*out, MakePolicy(force), GivenTo(experiment, config, kRunFiles));
     }
-    RunResult found = Run(experiment, context);
+    auto found = std::make_shared<const RunResult>(Run(experiment, context));
     if (folder) {
-      WriteRun(experiment, found, folder->Files(), context);
+      WriteRun(experiment, *found, folder->Files(), context);
       folder->Publish();
     }
     return found;
   });
-  py::dict results;
-  results["result"] = FromJson(ResultJson(experiment, result).dump());
-  results["surface"] = result.fit.surface;
-  results["faults"] = result.Faults();
-  return results;
+  py::dict parts;
+  parts["numbers"] = ResultJson(experiment, *result).dump();
+  parts["arrays"] = ResultArrays(*result);
+  parts["faults"] = result->Faults();
+  parts["page"] = py::cpp_function([title = experiment.title, result] {
+    const py::gil_scoped_release release;
+    return ViewPage(title, *result);
+  });
+  return parts;
 }
 
-// Reads a CSV file as a pandas.DataFrame if pandas is installed, otherwise as a list of
-// dictionaries.
-py::object ReadTable(const fs::path& csv) {
-  try {
-    return py::module_::import("pandas").attr("read_csv")(csv.string());
-  } catch (const py::error_already_set& error) {
-    if (!error.matches(PyExc_ImportError)) {
-      throw;
-    }
+// The files that a study names under `plugins`. Faults of the file are left to ReadStudy.
+std::vector<std::string> ListPlugins(const std::string& path) {
+  ConfigNode tree;
+  ConfigErrors errors;
+  std::vector<std::string> files;
+  for (const fs::path& file : ReadStudyFile(path, tree, errors).plugins) {
+    files.push_back(file.string());
   }
-  const py::object file = py::module_::import("builtins").attr("open")(csv.string());
-  const py::object rows = py::list(py::module_::import("csv").attr("DictReader")(file));
-  file.attr("close")();
-  return rows;
+  return files;
 }
 
-// Reads the present trials.csv of the folder of a study.
-py::object ReadStudyTable(const fs::path& folder) {
+// Throws IoError unless the folder is that of a study with a trials.csv.
+void CheckStudyFolder(const std::string& path) {
+  const fs::path folder = path;
   if (!fs::exists(folder / "plan.json")) {
     throw IoError(
         fmt::format("{}: not the folder of a study, because it has no plan.json", folder.string()));
@@ -94,48 +103,50 @@ py::object ReadStudyTable(const fs::path& folder) {
         "{}: it has no trials.csv yet; `semblance report {}` makes it from the finished trials",
         folder.string(), folder.string()));
   }
-  return ReadTable(folder / "trials.csv");
 }
 
-py::object RunStudyFile(const std::string& path, const std::optional<std::string>& given,
-                        int jobs) {
-  if (fs::is_directory(path)) {
-    if (given) {
-      throw InputError(
-          fmt::format("{}: this is the folder of a study, which is only read; omit 'out'", path));
-    }
-    return ReadStudyTable(path);
-  }
-  const fs::path out = given ? fs::path(*given) : "out" / fs::path(path).stem();
-  const StudyPlan plan = ReadStudy(path);
+// Runs a study or a shard of it. Writes the tables unless it is a shard. Returns the counts of
+// StudySummary, and the ranking as text.
+py::dict RunStudyFile(const std::string& path, const std::string& out, int jobs,
+                      std::pair<int, int> shard, const std::string& only,
+                      const py::iterable& schemes, const py::iterable& metrics) {
+  const StudyPlan plan = ReadStudy(
+      path, WithoutSubjects::kFault,
+      {.schemes = ReadSchemes(schemes), .metrics = ReadMetrics(metrics), .are_files_loaded = true});
   StudyRunOptions options;
   options.jobs = jobs;
-  Interruptible([&](const std::stop_token& stop) {
+  options.shard = shard.first;
+  options.shards = shard.second;
+  options.only = only;
+  std::string ranking;
+  const StudySummary summary = Interruptible([&](const std::stop_token& stop) {
     RunContext context;
     context.stop_token = stop;
-    RunStudy(plan, out, options, context);
-    OutputFolder folder(out, WhenNotEmpty::kReplaceFiles);
-    WriteStudyTables(folder);
+    StudySummary done = RunStudy(plan, out, options, context);
+    if (options.shards == 1) {
+      OutputFolder folder(out, WhenNotEmpty::kReplaceFiles);
+      ranking = RankingText(WriteStudyTables(folder));
+    }
+    return done;
   });
-  return ReadTable(out / "trials.csv");
+  py::dict counts;
+  counts["trials"] = summary.trials;
+  counts["skipped"] = summary.skipped;
+  counts["done"] = summary.done;
+  counts["failed"] = summary.failed;
+  counts["ranking"] = ranking;
+  return counts;
 }
 
 }  // namespace
 
 void BindExperiments(py::module_& module) {
-  module.def(
-      "run", &RunConfig, py::arg("config"), py::arg("set") = py::dict(),
-      py::arg("out") = py::none(), py::arg("force") = false, py::arg("threads") = 1,
-      "Runs an experiment, as `semblance run` does. set: options by path, e.g. "
-      "{'implicit.resolution': 60}. Returns {'result': result.json, 'surface': HSpline, "
-      "'faults': reasons why the result cannot be used, or []}. With `out`, writes the files "
-      "of a run to that folder too.");
-  module.def(
-      "study", &RunStudyFile, py::arg("path"), py::arg("out") = py::none(), py::arg("jobs") = 1,
-      "Runs a study, or its unfinished trials, into the folder `out` (default: out/NAME, like "
-      "`semblance study NAME.yaml`), and returns trials.csv in long form. If `path` is the "
-      "folder of a study, only reads its trials.csv. Returns a pandas.DataFrame if pandas is "
-      "installed, otherwise a list of dictionaries.");
+  module.def("run", &RunConfig, py::arg("config"), py::arg("overrides"), py::arg("out"),
+             py::arg("force"), py::arg("threads"), py::arg("schemes"));
+  module.def("list_plugins", &ListPlugins, py::arg("path"));
+  module.def("check_study_folder", &CheckStudyFolder, py::arg("path"));
+  module.def("study", &RunStudyFile, py::arg("path"), py::arg("out"), py::arg("jobs"),
+             py::arg("shard"), py::arg("only"), py::arg("schemes"), py::arg("metrics"));
 }
 
 }  // namespace semblance::problems

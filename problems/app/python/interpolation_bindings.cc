@@ -1,7 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include <pybind11/stl.h>
+
+#include <optional>
+
 #include "interp/dowels/dowel_network.h"
 #include "interp/interpolate_depth.h"
 #include "problems/app/python/bindings.h"
+#include "problems/app/python/plugins.h"
 #include "problems/app/python/values.h"
 #include "problems/config/config.h"
 
@@ -35,22 +40,47 @@ std::vector<Dowel> MakeDowels(const std::vector<Vec3>& bases, const std::vector<
   return dowels;
 }
 
+DowelNetwork MakeNetwork(const std::optional<Indices>& areas, std::size_t dowels) {
+  DowelNetwork network;
+  if (areas) {
+    for (const Triangle& area : ReadTriangles(*areas, "areas", dowels)) {
+      network.areas.push_back({area[0], area[1], area[2]});
+    }
+  }
+  return network;
+}
+
+// One of `schemes`, or a built-in scheme.
+DepthScheme ReadScheme(const std::string& text, const std::vector<NamedScheme>& schemes) {
+  constexpr const char* kCall = "interpolate(...)";
+  ConfigErrors errors;
+  const ConfigNode tree = LoadConfigTextTree("{scheme: " + text + "}", kCall, {},
+                                             MakeConfigTree(SchemeChoice{}), errors);
+  errors.ThrowIfAny();
+  const ConfigNode* const node = tree.Find("scheme");
+  const auto external = node == nullptr ? std::nullopt : ReadExternalScheme(*node, schemes, errors);
+  DepthScheme scheme =
+      external ? DepthScheme(*external) : ReadConfigTree<SchemeChoice>(tree, errors).scheme;
+  errors.ThrowIfAny();
+  return scheme;
+}
+
 py::tuple Interpolate(const Doubles& vertices, const Indices& triangles, const Doubles& bases,
-                      const Doubles& directions, const Doubles& depths_mm, const py::object& scheme,
-                      int threads) {
+                      const Doubles& directions, const Doubles& depths_mm,
+                      const std::string& scheme_text, const py::iterable& schemes,
+                      const std::optional<Indices>& areas, int threads) {
   const TriMesh skull = MakeMesh(vertices, triangles);
   const std::vector<Dowel> dowels = MakeDowels(
       Points3(bases, "bases"), Points3(directions, "directions"), Numbers(depths_mm, "depths_mm"));
-  const auto choice =
-      ReadConfigText<SchemeChoice>("{scheme: " + OptionText(scheme) + "}", "interpolate(...)");
+  const DowelNetwork network = MakeNetwork(areas, dowels.size());
+  const DepthScheme scheme = ReadScheme(scheme_text, ReadSchemes(schemes));
   RunContext context;
   context.threads = threads;
   DepthField field;
   {
     const py::gil_scoped_release release;
     const std::vector<Vec3> normals = VertexNormals(skull);
-    const DowelNetwork network;
-    field = InterpolateDepth(choice.scheme, {skull, normals, dowels, network}, context);
+    field = InterpolateDepth(scheme, {skull, normals, dowels, network}, context);
   }
   return py::make_tuple(MakeArray(field.depth_mm), MakeArray(field.sd_mm));
 }
@@ -58,15 +88,9 @@ py::tuple Interpolate(const Doubles& vertices, const Indices& triangles, const D
 }  // namespace
 
 void BindInterpolation(py::module_& module) {
-  module.def(
-      "interpolate", &Interpolate, py::arg("vertices"), py::arg("triangles"), py::arg("bases"),
-      py::arg("directions"), py::arg("depths_mm"), py::arg("scheme") = "kriging",
-      py::arg("threads") = 1,
-      "Returns (depth_mm, sd_mm) per vertex of a skull from a few depth markers; NaN where the "
-      "scheme gives none.\n\n"
-      "vertices n x 3, triangles m x 3 (from 0), bases and directions k x 3, depths_mm k. "
-      "scheme: name of a scheme without a network, or a dictionary with `type` and its options, "
-      "like `interp` in a configuration.");
+  module.def("interpolate", &Interpolate, py::arg("vertices"), py::arg("triangles"),
+             py::arg("bases"), py::arg("directions"), py::arg("depths_mm"), py::arg("scheme"),
+             py::arg("schemes"), py::arg("areas"), py::arg("threads"));
 }
 
 }  // namespace semblance::problems

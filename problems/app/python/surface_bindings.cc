@@ -1,12 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <fmt/format.h>
+#include <pybind11/stl.h>
 
+#include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "problems/app/python/bindings.h"
 #include "problems/app/python/values.h"
 #include "problems/face/edit_script.h"
+#include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
+#include "surfaces/hspline_files/face_export.h"
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/hspline_query/hspline_batch.h"
 #include "surfaces/hspline_query/hspline_project.h"
@@ -16,7 +22,6 @@ namespace semblance::problems {
 namespace {
 
 namespace py = pybind11;
-using Release = py::call_guard<py::gil_scoped_release>;
 
 // Shape: rows x columns x 3.
 Doubles NetArray(const HSplineSurface& surface, int level) {
@@ -100,71 +105,72 @@ py::tuple MeshAt(const HSplineSurface& surface, int per_patch) {
                         MakeArray(drawn.uv));
 }
 
-// Evaluation, projection and tessellation of a surface.
-void BindEvaluation(py::class_<HSplineSurface>& surface) {
-  surface
-      .def("points", &PointsAt, py::arg("uv"), py::arg("threads") = 1,
-           "n x 3 points at n x 2 (u, v).")
-      .def("normals", &NormalsAt, py::arg("uv"), py::arg("threads") = 1,
-           "n x 3 unit normals; zero where the tangents vanish.")
-      .def("derivatives", &DerivativesAt, py::arg("uv"), py::arg("du"), py::arg("dv"),
-           "n x 3 derivatives of order du in u and dv in v, with du + dv <= 2.")
-      .def("project", &Project, py::arg("points"),
-           "(uv, distance_mm) of the closest points of the surface.")
-      .def("mesh", &MeshAt, py::arg("per_patch") = 4,
-           "(vertices, triangles, uv), with per_patch quads along each side of a finest patch.");
+// The 16 control vertices of a level that a point depends on, as indices into the rows of the net,
+// and their weights.
+py::tuple StencilsAt(const HSplineSurface& surface, int level, const Doubles& uv, int du, int dv) {
+  if (level < 0 || level > surface.shape().max_level) {
+    throw InputError(fmt::format("level {}: the surface has the levels 0 to {}", level,
+                                 surface.shape().max_level));
+  }
+  const std::vector<Vec2> at = Points2(uv, "uv");
+  const py::ssize_t rows = std::ssize(at);
+  Indices indices({rows, py::ssize_t{16}});
+  Doubles weights({rows, py::ssize_t{16}});
+  for (py::ssize_t k = 0; k < rows; ++k) {
+    const Stencil stencil = surface.StencilAt(level, at[k], {du, dv});
+    std::copy(stencil.index.begin(), stencil.index.end(), indices.mutable_data(k));
+    std::copy(stencil.weight.begin(), stencil.weight.end(), weights.mutable_data(k));
+  }
+  return py::make_tuple(indices, weights);
 }
 
-// The control vertices of a surface, and edits of them.
-void BindNets(py::class_<HSplineSurface>& surface) {
-  surface
-      .def("net", &NetArray, py::arg("level"),
-           "The control vertices of a level, rows x columns x 3, as absolute positions that "
-           "include coarser "
-           "detail.")
-      .def(
-          "set_net",
-          [](HSplineSurface& s, int level, const Doubles& net) { s.SetNet(level, ParseNet(net)); },
-          py::arg("level"), py::arg("net"),
-          "Sets the control vertices of a level. Finer detail moves with them.")
-      .def(
-          "edit",
-          [](HSplineSurface& s, const std::string& script) {
-            ApplyEdits(ReadEditScript(script), s);
-          },
-          py::arg("script"), "Applies the edits of a script, as `semblance edit` does.");
+// Writes the surface in the format of the path's ending: .hspline.json without loss, or a format of
+// other programs.
+void WriteAnyFormat(const HSplineSurface& surface, const std::string& path,
+                    std::optional<double> chord_mm, int threads) {
+  const std::filesystem::path file = path;
+  const py::gil_scoped_release release;
+  if (file.extension() == ".json") {
+    WriteHSpline(file, surface);
+  } else {
+    WriteFileAtomically(file, EncodeFace(surface, file.extension().string(), chord_mm, threads));
+  }
 }
 
 }  // namespace
 
 void BindSurface(py::module_& module) {
-  py::class_<HSplineSurface> surface(
-      module, "HSpline",
-      "A hierarchical B-spline surface: bicubic, with dyadic levels. Detail "
-      "is stored as offsets from the next coarser level. (u, v) lie in "
-      "[0,1] x [0,1].");
-  surface
-      .def(py::init(&MakeSurface), py::arg("level0"), py::arg("max_level") = 0,
-           py::arg("periodic_u") = false,
-           "Makes a surface from the control vertices of level 0, rows x columns x 3. An open side "
-           "has "
-           "three more vertices than patches.")
-      .def_static(
-          "read", [](const std::string& path) { return ReadHSpline(path); }, py::arg("path"),
-          "Reads a .hspline.json without loss.")
-      .def(
-          "write", [](const HSplineSurface& s, const std::string& path) { WriteHSpline(path, s); },
-          py::arg("path"), "Writes a .hspline.json; read() gives the identical surface.")
+  const auto set_net = [](HSplineSurface& s, int level, const Doubles& net) {
+    s.SetNet(level, ParseNet(net));
+  };
+  const auto edit = [](HSplineSurface& s, const std::string& script) {
+    ApplyEdits(ReadEditScript(script), s);
+  };
+  const auto patches = [](const HSplineSurface& s) {
+    return py::make_tuple(s.shape().patches_u, s.shape().patches_v);
+  };
+  py::class_<HSplineSurface>(module, "Surface")
+      .def(py::init(&MakeSurface), py::arg("level0"), py::arg("max_level"), py::arg("periodic_u"))
+      .def_static("read", [](const std::string& path) { return ReadHSpline(path); })
+      .def_static("from_json",
+                  [](const std::string& text) { return HSplineFromJson(text, "pickle"); })
+      .def("to_json", [](const HSplineSurface& s) { return HSplineToJson(s); })
+      .def("copy", [](const HSplineSurface& s) { return HSplineSurface(s); })
+      .def("write", &WriteAnyFormat, py::arg("path"), py::arg("chord_mm"), py::arg("threads"))
+      .def("points", &PointsAt, py::arg("uv"), py::arg("threads"))
+      .def("normals", &NormalsAt, py::arg("uv"), py::arg("threads"))
+      .def("derivatives", &DerivativesAt, py::arg("uv"), py::arg("du"), py::arg("dv"))
+      .def("project", &Project, py::arg("points"))
+      .def("mesh", &MeshAt, py::arg("per_patch"))
+      .def("stencils", &StencilsAt, py::arg("level"), py::arg("uv"), py::arg("du"), py::arg("dv"))
+      .def("net", &NetArray, py::arg("level"))
+      .def("set_net", set_net, py::arg("level"), py::arg("net"))
+      .def("edit", edit, py::arg("script"))
       .def_property_readonly("max_level",
                              [](const HSplineSurface& s) { return s.shape().max_level; })
-      .def_property_readonly("patches",
-                             [](const HSplineSurface& s) {
-                               return py::make_tuple(s.shape().patches_u, s.shape().patches_v);
-                             })
+      .def_property_readonly("patches", patches)
       .def_property_readonly("periodic_u",
                              [](const HSplineSurface& s) { return s.shape().ClosedU(); });
-  BindEvaluation(surface);
-  BindNets(surface);
 }
 
 }  // namespace semblance::problems

@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
-#include <nlohmann/json.hpp>
-#include <set>
+#include <cmath>
 
 #include "surfaces/base/error.h"
 
@@ -30,12 +28,24 @@ void CheckColumns(const py::array& array, int columns, std::string_view name) {
   }
 }
 
+// Throws InputError with the first row that has a number that is not finite.
+void CheckRowsFinite(const Doubles& array, py::ssize_t columns, std::string_view name) {
+  const double* const numbers = array.data();
+  for (py::ssize_t k = 0; k < array.size(); ++k) {
+    if (!std::isfinite(numbers[k])) {
+      throw InputError(fmt::format("{}: row {} has {}, which is not finite; leave the row out",
+                                   name, k / columns, numbers[k]));
+    }
+  }
+}
+
 // Copies the rows at once, because array and vectors both store kColumns doubles per row without
 // gaps.
 template <class Vector>
 std::vector<Vector> Rows(const Doubles& array, std::string_view name) {
   constexpr int kColumns = Vector::RowsAtCompileTime;
   CheckColumns(array, kColumns, name);
+  CheckRowsFinite(array, kColumns, name);
   std::vector<Vector> rows(array.shape(0));
   if (!rows.empty()) {
     std::copy_n(array.data(), kColumns * rows.size(), rows.front().data());
@@ -53,34 +63,6 @@ Doubles MakeTable(std::span<const Vector> rows) {
   return array;
 }
 
-// Quotes a text unless YAML can read it only as a plain word. Plain words must stay unquoted,
-// because the readers of configurations refuse quotes around them.
-std::string Quoted(const std::string& text) {
-  static const std::set<std::string> kNotText = {"null", "true", "false", "yes", "no",
-                                                 "on",   "off",  "nan",   "inf"};
-  const bool word = !text.empty() && std::isalpha(static_cast<unsigned char>(text[0])) != 0 &&
-                    std::all_of(text.begin(), text.end(),
-                                [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
-  return word && !kNotText.contains(text) ? text : nlohmann::json(text).dump();
-}
-
-std::string ListText(const py::handle& list) {
-  std::string text;
-  for (const py::handle& entry : list) {
-    text += (text.empty() ? "" : ", ") + OptionText(entry);
-  }
-  return "[" + text + "]";
-}
-
-std::string MapText(const py::dict& map) {
-  std::string text;
-  for (const auto& [key, value] : map) {
-    text +=
-        fmt::format("{}{}: {}", text.empty() ? "" : ", ", Quoted(py::str(key)), OptionText(value));
-  }
-  return "{" + text + "}";
-}
-
 }  // namespace
 
 std::vector<Vec3> Points3(const Doubles& array, std::string_view name) {
@@ -91,28 +73,38 @@ std::vector<Vec2> Points2(const Doubles& array, std::string_view name) {
   return Rows<Vec2>(array, name);
 }
 
-std::span<const double> Numbers(const Doubles& array, std::string_view name) {
+std::span<const double> Numbers(const Doubles& array, std::string_view name,
+                                MissingNumbers missing) {
   if (array.ndim() != 1) {
     throw InputError(fmt::format("{} is {}; expected an array of n", name, DescribeShape(array)));
+  }
+  if (missing == MissingNumbers::kRefuse) {
+    CheckRowsFinite(array, 1, name);
   }
   return {array.data(), static_cast<std::size_t>(array.shape(0))};
 }
 
-TriMesh MakeMesh(const Doubles& vertices, const Indices& triangles) {
-  TriMesh mesh{.points = Points3(vertices, "vertices"), .triangles = {}};
-  CheckColumns(triangles, 3, "triangles");
-  const auto count = static_cast<std::int64_t>(mesh.points.size());
+std::vector<Triangle> ReadTriangles(const Indices& triangles, std::string_view name,
+                                    std::size_t count) {
+  CheckColumns(triangles, 3, name);
+  std::vector<Triangle> rows;
   for (py::ssize_t t = 0; t < triangles.shape(0); ++t) {
-    Triangle& triangle = mesh.triangles.emplace_back();
+    Triangle& triangle = rows.emplace_back();
     for (int k = 0; k < 3; ++k) {
       const std::int64_t vertex = triangles.at(t, k);
-      if (vertex < 0 || vertex >= count) {
-        throw InputError(fmt::format("triangles: row {} names vertex {}; there are {}, from 0", t,
-                                     vertex, count));
+      if (vertex < 0 || vertex >= static_cast<std::int64_t>(count)) {
+        throw InputError(fmt::format("{}: row {} names {} {}; there are {}, from 0", name, t,
+                                     name == "areas" ? "dowel" : "vertex", vertex, count));
       }
       triangle[k] = static_cast<std::int32_t>(vertex);
     }
   }
+  return rows;
+}
+
+TriMesh MakeMesh(const Doubles& vertices, const Indices& triangles) {
+  TriMesh mesh{.points = Points3(vertices, "vertices"), .triangles = {}};
+  mesh.triangles = ReadTriangles(triangles, "triangles", mesh.points.size());
   return mesh;
 }
 
@@ -132,33 +124,6 @@ Indices MakeArray(std::span<const Triangle> triangles) {
     to = std::copy(t.begin(), t.end(), to);
   }
   return array;
-}
-
-std::string OptionText(const py::handle& value) {
-  if (value.is_none()) {
-    return "null";
-  }
-  if (py::isinstance<py::bool_>(value)) {
-    return value.cast<bool>() ? "true" : "false";
-  }
-  if (py::isinstance<py::float_>(value)) {
-    return py::repr(py::float_(py::reinterpret_borrow<py::object>(value)));
-  }
-  if (py::hasattr(value, "__index__")) {  // NumPy's whole numbers too
-    return py::str(py::int_(py::reinterpret_borrow<py::object>(value)));
-  }
-  if (py::isinstance<py::dict>(value)) {
-    return MapText(py::reinterpret_borrow<py::dict>(value));
-  }
-  if (py::isinstance<py::list>(value) || py::isinstance<py::tuple>(value)) {
-    return ListText(value);
-  }
-  if (py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__")) {
-    return Quoted(py::str(value));
-  }
-  throw InputError(fmt::format(
-      "an option is a {}; expected a number, a text, True or False, None, a list or a dictionary",
-      std::string(py::str(py::type::handle_of(value).attr("__name__")))));
 }
 
 }  // namespace semblance::problems

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Conversions between values of Python and of C++: NumPy's arrays, and keyword arguments.
+// Conversions between values of Python and of C++: NumPy's arrays.
 #pragma once
 
 #include <pybind11/numpy.h>
 
 #include <cstdint>
 #include <span>
-#include <string>
 #include <string_view>
 #include <vector>
 
@@ -21,22 +20,26 @@ using Doubles = pybind11::array_t<double, pybind11::array::c_style | pybind11::a
 using Indices =
     pybind11::array_t<std::int64_t, pybind11::array::c_style | pybind11::array::forcecast>;
 
+// Arrays whose numbers may be NaN, and all others.
+enum class MissingNumbers { kRefuse, kAllow };
+
 // Convert arrays of n x 3, n x 2 and n numbers. Numbers() returns a view of the array. `name`: name
-// of the array in messages. They throw InputError for another shape.
+// of the array in messages. They throw InputError for another shape, and with the row for a number
+// that is not finite.
 std::vector<Vec3> Points3(const Doubles& array, std::string_view name);
 std::vector<Vec2> Points2(const Doubles& array, std::string_view name);
-std::span<const double> Numbers(const Doubles& array, std::string_view name);
+std::span<const double> Numbers(const Doubles& array, std::string_view name,
+                                MissingNumbers missing = MissingNumbers::kRefuse);
 
 // vertices: n x 3. triangles: m x 3 indices from 0. Throws InputError for an index without vertex.
 TriMesh MakeMesh(const Doubles& vertices, const Indices& triangles);
+// m x 3 indices from 0, each below `count`. `name`: name of the array in messages.
+std::vector<Triangle> ReadTriangles(const Indices& triangles, std::string_view name,
+                                    std::size_t count);
 
 Doubles MakeArray(std::span<const Vec3> points);
 Doubles MakeArray(std::span<const Vec2> points);
 Doubles MakeArray(std::span<const double> numbers);
 Indices MakeArray(std::span<const Triangle> triangles);
-
-// Converts numbers, strings, booleans, None, lists and dictionaries of these to YAML, so that the
-// readers of configurations check keyword arguments too. Throws InputError for any other object.
-std::string OptionText(const pybind11::handle& value);
 
 }  // namespace semblance::problems

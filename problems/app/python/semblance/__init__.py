@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Faces from skulls: H-splines, fits of scattered points, depths between depth markers, experiments and studies.
+
+Lengths are in mm. Arrays are NumPy arrays of doubles.
+"""
+from ._semblance import __version__
+from .errors import ConfigError, InputError, IoError, PluginError, UnknownOptionError
+from .experiments import interpolate, run, study
+from .plugins import DepthInput, Metric, Scheme, load_plugins, metric, scheme
+from .points import PointFit, fit, fit_options
+from .regressor import SurfaceRegressor
+from .results import FACE_PARTS, Result
+from .surface import HSpline, fit_rows
+
+__all__ = ["ConfigError", "DepthInput", "FACE_PARTS", "HSpline", "InputError", "IoError", "Metric", "PluginError", "PointFit", "Result", "Scheme",
+           "SurfaceRegressor", "UnknownOptionError", "fit", "fit_options", "fit_rows", "interpolate", "load_plugins", "metric", "run", "scheme", "study"]
