@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tests the Python module against closed forms and against files that it reads back."""
+import copy
+import inspect
 import os
+import pickle
 import signal
 import sys
 import tempfile
@@ -104,6 +107,63 @@ class Surface(unittest.TestCase):
         self.assertTrue((surface.points(uv, threads=3) == surface.points(uv)).all())
 
 
+    def test_copies_and_pickles_are_equal_and_independent(self):
+        surface = semblance.HSpline(plane_net() + 0.1, max_level=1)
+        for other in (copy.copy(surface), copy.deepcopy(surface), pickle.loads(pickle.dumps(surface))):
+            self.assertEqual(other, surface)
+            net = other.net(0)
+            net[0, 0, 2] += 1
+            other.set_net(0, net)
+            self.assertNotEqual(other, surface)
+        self.assertEqual(repr(surface), "<HSpline of 3 x 2 patches, levels 0 to 1>")
+        self.assertEqual(str(inspect.signature(semblance.HSpline.normals)), "(self, uv, threads: int = 1, clamp: bool = False) -> numpy.ndarray")
+
+    def test_a_uv_outside_the_domain_is_an_error_unless_clamped(self):
+        surface = semblance.HSpline(plane_net())
+        with self.assertRaisesRegex(semblance.InputError, r"uv: row 1 is \[0.5, 1.25\]"):
+            surface.points([[0, 0], [0.5, 1.25]])
+        with self.assertRaisesRegex(semblance.InputError, "row 0 has nan"):
+            surface.points([[np.nan, 0]])
+        np.testing.assert_array_equal(surface.points([[0.5, 1.25]], clamp=True), surface.points([[0.5, 1]]))
+        np.testing.assert_array_equal(surface([0.2, 0.4], [[0.1], [0.3], [0.5]])[2, 1], surface.points([[0.4, 0.5]])[0])
+
+    def test_exports_have_the_format_of_their_ending(self):
+        surface = semblance.HSpline(plane_net())
+        with tempfile.TemporaryDirectory() as folder:
+            for ending, first in (("ply", b"ply"), ("glb", b"glTF"), ("vtu", b"<?xml"), ("obj", b""), ("step", b"ISO-10303-21")):
+                path = os.path.join(folder, "s." + ending)
+                try:
+                    surface.write(path)
+                except semblance.InputError as error:  # a build without OpenCASCADE
+                    self.assertIn("OpenCASCADE", str(error))
+                    continue
+                with open(path, "rb") as file:
+                    self.assertTrue(file.read().startswith(first), ending)
+            with self.assertRaises(semblance.InputError):
+                surface.write(os.path.join(folder, "s.txt"))
+
+    def test_stencils_are_the_linear_form_of_points_and_derivatives(self):
+        surface = semblance.HSpline(plane_net() + np.random.default_rng(6).normal(size=(5, 6, 3)), max_level=1)
+        uv = np.random.default_rng(7).random((30, 2))
+        for du, dv in ((0, 0), (1, 0), (0, 2)):
+            index, weight = surface.stencils(1, uv, du, dv)
+            np.testing.assert_allclose((weight[..., None] * surface.net(1).reshape(-1, 3)[index]).sum(axis=1), surface.derivatives(uv, du, dv), atol=1e-9)
+
+    def test_linear_rows_of_points_bring_the_surface_to_them(self):
+        surface = semblance.HSpline(plane_net())
+        uv = np.random.default_rng(8).random((200, 2))
+        wanted = surface.points(uv) + np.column_stack([0 * uv[:, 0], 0 * uv[:, 0], 3 + 2 * uv[:, 0] * uv[:, 1]])
+        index, weight = surface.stencils(0, uv)
+        rows = np.zeros((len(uv), 30))
+        np.put_along_axis(rows, index, weight, axis=1)
+        fitted = semblance.fit_rows(surface, 0, rows, wanted, smoothness=1e-12)
+        np.testing.assert_allclose(fitted.points(uv), wanted, atol=1e-4)
+        with self.assertRaisesRegex(semblance.InputError, "rows have the shape"):
+            semblance.fit_rows(surface, 0, rows[:, 1:], wanted)
+        with self.assertRaisesRegex(semblance.InputError, "determine 16 of 30"):
+            semblance.fit_rows(surface, 0, rows[:16], wanted[:16], smoothness=0)
+
+
 class Fit(unittest.TestCase):
     def test_a_paraboloid_within_the_tolerance(self):
         points = paraboloid(41)
@@ -132,6 +192,50 @@ class Fit(unittest.TestCase):
         found = semblance.fit(points, uv, patches_u=4, patches_v=4)
         np.testing.assert_array_equal(found.uv, uv)
 
+    def test_noise_and_outliers_are_those_of_the_points(self):
+        random = np.random.default_rng(9)
+        xy = random.uniform(-20, 20, (4000, 2))
+        points = np.column_stack([xy, 3 * np.sin(xy[:, 0] / 6) + random.normal(0, 0.1, 4000)])
+        points[:40, 2] += 5
+        found = semblance.fit(points, attributes={"intensity": 2 * xy[:, 0]}, sigma=True)
+        self.assertAlmostEqual(found.noise_mm, 0.1, delta=0.01)
+        self.assertAlmostEqual(found.held_out_mm, 0.1, delta=0.03)
+        np.testing.assert_array_equal(found.outliers, np.arange(40))
+        used = np.setdiff1d(np.arange(4000), found.outliers)
+        self.assertAlmostEqual(found.rms_mm, np.sqrt(np.mean(found.residuals_mm[used] ** 2)), delta=1e-9)
+        self.assertAlmostEqual(found.rms_of_all_mm, np.sqrt(np.mean(found.residuals_mm**2)), delta=1e-9)
+        np.testing.assert_allclose(found.attributes["intensity"], 2 * xy[:, 0], atol=0.05)
+        np.testing.assert_allclose(found.attribute("intensity", found.uv[:9]), found.attributes["intensity"][:9], atol=1e-9)
+        self.assertTrue((found.sigma_mm > 0).all() and found.sigma_mm.mean() < 0.1)
+        self.assertIn("noise", found.report)
+        self.assertAlmostEqual(found(3.0, 4.0), 3 * np.sin(0.5), delta=0.1)
+        again = pickle.loads(pickle.dumps(found))
+        self.assertEqual(again, found)
+        np.testing.assert_array_equal(again.predict(xy[:9])["sd"], found.predict(xy[:9])["sd"])
+
+    def test_exact_points_are_met_and_weights_follow_sigma(self):
+        random = np.random.default_rng(10)
+        points = paraboloid(31) + random.normal(0, 0.2, (961, 3)) * [0, 0, 1]
+        found = semblance.fit(points, exact=[5, 480])
+        np.testing.assert_allclose(found.residuals_mm[[5, 480]], 0, atol=1e-6)
+        sigma = random.uniform(0.1, 0.3, 961)
+        one, two = semblance.fit(points, sigma_of_points=sigma), semblance.fit(points, weights=1 / sigma**2)
+        np.testing.assert_allclose(one.surface.net(0), two.surface.net(0), atol=1e-9)
+
+    def test_wrong_rows_are_reported(self):
+        points = paraboloid(9)
+        points[17, 1] = np.nan
+        with self.assertRaisesRegex(semblance.InputError, "points: row 17 has nan"):
+            semblance.fit(points)
+        with self.assertRaisesRegex(ValueError, "weights: row 3 is 0"):
+            semblance.fit(paraboloid(9), weights=[1, 1, 1, 0] + 77 * [1])
+        with self.assertRaisesRegex(semblance.InputError, "exact: entry 0 is point 81"):
+            semblance.fit(paraboloid(9), exact=[81])
+        with self.assertRaisesRegex(semblance.InputError, "both given"):
+            semblance.fit(paraboloid(9), weights=np.ones(81), sigma_of_points=np.ones(81))
+        with self.assertRaises(TypeError):
+            semblance.fit(paraboloid(9), patches_w=3)
+
     def test_unknown_options_are_reported_with_a_suggestion(self):
         with self.assertRaisesRegex(semblance.ConfigError, "patches_w.*did you mean 'patches_[uv]'"):
             semblance.fit(paraboloid(9), patches_w=3)
@@ -140,7 +244,10 @@ class Fit(unittest.TestCase):
 
     def test_the_documentation_names_each_option(self):
         for word in ("patches_u", "closure", "parameters", "tolerance_mm"):
-            self.assertIn(word, semblance.fit.__doc__)
+            self.assertIn(word, semblance.fit_options())
+        for thing in (semblance.fit, semblance.run, semblance.study, semblance.interpolate, semblance.scheme, semblance.HSpline):
+            self.assertLessEqual(thing.__doc__.count("\n"), 60)
+            self.assertGreaterEqual(len(inspect.signature(thing).parameters), 2)
 
     def test_other_threads_run_meanwhile(self):
         counted = [0]
@@ -194,6 +301,15 @@ class Experiments(unittest.TestCase):
                 semblance.run(config, set=self.QUICK, out=out)  # no file is replaced without force
         self.assertTrue((run["surface"].net(0) == written.net(0)).all())
         self.assertGreater(run["result"]["face"]["rms_mm"], 0)
+        self.assertEqual(run.number("face.rms_mm"), run["result"]["face"]["rms_mm"])
+        np.testing.assert_array_equal(run.face[0], run.surface.mesh(4)[0])
+        self.assertEqual(len(run.depth_mm), len(run.skull[0]))
+        self.assertEqual(len(run.region), len(run.truth[0]))
+        again = pickle.loads(pickle.dumps(run))
+        self.assertEqual(again, run)
+        self.assertIn("<iframe srcdoc=", run._repr_html_())
+        self.assertNotIn("<iframe", again._repr_html_())
+        self.assertRegex(repr(run), r"<Result of phantom 1: (not )?usable, RMS error [0-9.]+ mm>")
 
     def test_a_study_returns_its_long_table(self):
         with tempfile.TemporaryDirectory() as folder:
