@@ -260,7 +260,7 @@ class Fitter {
 
   LevelView View(int level, const FitTarget& target) const {
     return MakeLevelView(result_.surface, rest_, target, level,
-                         {.aim = PlanAim(options_.plan), .held = Held()});
+                         {.aim = PlanAim(options_.plan), .held = Held(), .terms = options_.terms});
   }
 
   LevelSummary SolveLevel(const ScheduleStep& step, std::span<const Term> terms,

@@ -50,10 +50,23 @@ class FaultFinder {
       AutoWeights();
     }
     FindRelaxation();
+    OneTermOfRows();
     return std::move(faults_);
   }
 
  private:
+  // The view of a level has one list of what finer levels add to rows.
+  void OneTermOfRows() {
+    int count = 0;
+    for (std::size_t k = 0; k < options_.terms.size(); ++k) {
+      count += std::holds_alternative<RowsTerm>(options_.terms[k]) ? 1 : 0;
+      if (count > 1) {
+        Add(fmt::format("terms[{}]", k), "the term 'rows' is there twice; put all rows into one");
+        return;
+      }
+    }
+  }
+
   void Add(std::string path, std::string what) {
     faults_.push_back({std::move(path), std::move(what)});
   }

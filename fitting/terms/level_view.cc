@@ -55,6 +55,25 @@ void AddBone(const BoneAnchor& anchor, const Vec3& given, const Observation& o, 
   }
 }
 
+// LevelView::finer_in_rows.
+std::vector<Vec3> FinerInRows(const HSplineSurface& surface, int level,
+                              const ViewOptions& options) {
+  std::vector<Vec3> finer;
+  for (const Term& term : options.terms) {
+    const auto* const rows = std::get_if<RowsTerm>(&term);
+    for (const LinearRow& row : rows == nullptr ? std::vector<LinearRow>() : rows->rows) {
+      Vec3 sum = Vec3::Zero();
+      for (const auto& [u, v, du, dv, c] : row.at) {
+        const DerivativeOrder order{static_cast<int>(du), static_cast<int>(dv)};
+        sum +=
+            c * (surface.Derivative({u, v}, order) - surface.LevelDerivative(level, {u, v}, order));
+      }
+      finer.push_back(sum);
+    }
+  }
+  return finer;
+}
+
 }  // namespace
 
 double LevelView::WeightSum() const {
@@ -169,6 +188,9 @@ LevelView MakeLevelView(const HSplineSurface& surface, const HSplineSurface& res
   view.likely = LikelyShape(shape, target.shape);
   for (Observation& o : view.likely) {
     o = WithoutFiner(o, surface, level, options.aim);
+  }
+  if (options.aim == FitAim::kSurface && level < shape.max_level) {
+    view.finer_in_rows = FinerInRows(surface, level, options);
   }
   return view;
 }

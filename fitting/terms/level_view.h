@@ -13,6 +13,7 @@
 #include "fitting/problem/fit_target.h"
 #include "fitting/space/hierarchical_spline_space.h"
 #include "fitting/space/point_cloud.h"
+#include "fitting/terms/term.h"
 #include "surfaces/hspline/bspline.h"
 #include "surfaces/hspline/hspline_surface.h"
 
@@ -64,6 +65,9 @@ struct LevelView {
   // / sd|^2.
   std::vector<Observation> likely = {};
 
+  // The part of each row of the term `rows` that finer levels add, mm; empty: none.
+  std::vector<Vec3> finer_in_rows = {};
+
   std::shared_ptr<const SplineElements> space = nullptr;  // all levels; null for a single level
 
   double WeightSum() const;  // over the observations
@@ -84,6 +88,7 @@ void AddElementRows(const SplineElement& element, std::shared_ptr<const Eigen::M
 struct ViewOptions {
   FitAim aim = FitAim::kSurface;
   std::span<const VertexId> held = {};  // vertices of any level
+  std::span<const Term> terms = {};     // those of the fit; only the rows of a RowsTerm count
 };
 
 // Makes the view of one level with its present vertices; the points of the target keep their order.

@@ -10,8 +10,12 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <cstddef>
+#include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 #include "surfaces/base/fields.h"
 #include "surfaces/hspline/hspline_shape.h"
@@ -309,9 +313,58 @@ void Fields(Visitor& visit, SpringTerm& o) {
   WeightField(visit, o.weight);
 }
 
-using Term =
-    std::variant<PointTerm, PriorTerm, SmoothnessTerm, MembraneTerm, TangentPointTerm, SymmetryTerm,
-                 NonPenetrationTerm, SpringTerm, DistortionTerm, LandmarkTerm, PriorShapeTerm>;
+// A linear equation of the surface: the sum of c_k D_k S(u_k, v_k) over the entries of `at` equals
+// `equals`, mm. D_k is the derivative of order du in u and dv in v.
+struct LinearRow {
+  std::vector<std::array<double, 5>> at;  // u, v, du, dv, c of each entry
+  std::array<double, 3> equals = {};
+};
+template <class Visitor>
+void Fields(Visitor& visit, LinearRow& o) {
+  visit(FieldInfo{.name = "at",
+                  .min = 1,
+                  .doc = "points of the surface, as lists [u, v, du, dv, c]: c times the "
+                         "derivative of order du in u and dv in v; 0, 0 is the point itself"},
+        o.at);
+  visit(FieldInfo{.name = "equals", .unit = "mm", .doc = "the sum that they should have"},
+        o.equals);
+}
+
+// Rows of the caller: weight * mean over the rows of |sum - equals|^2, mm^2.
+struct RowsTerm {
+  static constexpr std::string_view kName = "rows";
+  double weight = 1;
+  std::vector<LinearRow> rows;
+};
+template <class Visitor>
+void Fields(Visitor& visit, RowsTerm& o) {
+  WeightField(visit, o.weight);
+  visit(FieldInfo{.name = "rows",
+                  .doc = "linear equations of the surface, e.g. [{at: [[0.5, 0.5, 1, 0, 1]], "
+                         "equals: [40, 0, 0]}] for its derivative in u at its middle"},
+        o.rows);
+}
+template <class Report>
+void CheckValue(Report& report, const RowsTerm& o) {
+  const auto is_order = [](double d) { return d == 0 || d == 1 || d == 2; };
+  if (o.rows.empty()) {
+    report("rows", "there is no row; give one or more");
+  }
+  for (std::size_t k = 0; k < o.rows.size(); ++k) {
+    for (const auto& [u, v, du, dv, c] : o.rows[k].at) {
+      if (!(u >= 0 && u <= 1 && v >= 0 && v <= 1)) {
+        report("rows", "row " + std::to_string(k) + ": (u,v) is not in 0..1");
+      } else if (!is_order(du) || !is_order(dv) || du + dv > 2) {
+        report("rows",
+               "row " + std::to_string(k) + ": du and dv are 0, 1 or 2, and at most 2 in all");
+      }
+    }
+  }
+}
+
+using Term = std::variant<PointTerm, PriorTerm, SmoothnessTerm, MembraneTerm, TangentPointTerm,
+                          SymmetryTerm, NonPenetrationTerm, SpringTerm, DistortionTerm,
+                          LandmarkTerm, PriorShapeTerm, RowsTerm>;
 
 inline std::string_view TermName(const Term& term) {
   return std::visit([](const auto& t) { return t.kName; }, term);

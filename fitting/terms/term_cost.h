@@ -27,6 +27,7 @@ void AddRows(const PriorShapeTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const PriorTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const SmoothnessTerm& term, const LevelView& view, RowSink& sink);
 void AddRows(const MembraneTerm& term, const LevelView& view, RowSink& sink);
+void AddRows(const RowsTerm& term, const LevelView& view, RowSink& sink);
 
 // Terms of the form |A X - B|^2 with the same A for x, y and z.
 template <class T>
@@ -158,6 +159,7 @@ double TermCost(const PriorShapeTerm& term, const LevelView& view, const Control
 double TermCost(const PriorTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const SmoothnessTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const MembraneTerm& term, const LevelView& view, const ControlNet& net);
+double TermCost(const RowsTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const TangentPointTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const SymmetryTerm& term, const LevelView& view, const ControlNet& net);
 double TermCost(const NonPenetrationTerm& term, const LevelView& view, const ControlNet& net);

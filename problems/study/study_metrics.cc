@@ -285,7 +285,7 @@ std::string MetricsText(StudyJob job) {
 
 bool IsExpression(const std::string& metric) { return ReadExpression(metric) != nullptr; }
 
-double MetricOf(const std::map<std::string, double>& numbers, const std::string& metric) {
+double ComputeMetric(const std::map<std::string, double>& numbers, const std::string& metric) {
   const auto number = [&](const std::string& name) {
     const auto found = numbers.find(name);
     return found == numbers.end() ? kNaN : found->second;

@@ -32,7 +32,7 @@ std::string MetricsText(StudyJob job);
 bool IsExpression(const std::string& metric);
 
 // Computes the metric from the numbers of a trial, by dotted path. NaN if it lacks one of them.
-double MetricOf(const std::map<std::string, double>& numbers, const std::string& metric);
+double ComputeMetric(const std::map<std::string, double>& numbers, const std::string& metric);
 
 // Returns true if the metric compares with the true skin, so that a subject without one lacks it.
 bool NeedsTrueSkin(const std::string& metric);

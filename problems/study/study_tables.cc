@@ -126,7 +126,7 @@ void AddExpression(StudyResults& results) {
     return;
   }
   for (TrialRow& row : results.trials) {
-    const double value = MetricOf(row.metrics, results.metric);
+    const double value = ComputeMetric(row.metrics, results.metric);
     if (std::isfinite(value)) {
       row.metrics[results.metric] = value;
     }

@@ -72,6 +72,26 @@ TEST(Fit, ReproducesASurfaceOfTheSpace) {
   }
 }
 
+// The rows state the whole surface, so the detail of finer levels is taken off them.
+TEST(Fit, RowsOfTheCallerMoveACoarseLevelUnderItsDetail) {
+  const HSplineSurface start = RandomSurface(Shape(), 1);
+  const Vec3 shift(3, -2, 5);
+  RowsTerm rows;
+  Random random(5);
+  for (int k = 0; k < 400; ++k) {
+    const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
+    const Vec3 there = start.Point(uv) + shift;
+    rows.rows.push_back(
+        {.at = {{uv.x(), uv.y(), 0, 0, 1}}, .equals = {there.x(), there.y(), there.z()}});
+  }
+  FitTarget target = TargetOn(start, 3);
+  const FitResult result =
+      Fit(start, target, {}, {.plan = ListedPlan{.schedule = {{0, 1}}}, .terms = {rows}}, {});
+  for (double u = 0.05; u < 1; u += 0.1) {
+    EXPECT_LT((result.surface.Point({u, 0.4}) - start.Point({u, 0.4}) - shift).norm(), 1e-8);
+  }
+}
+
 TEST(Fit, TakesTheFractionOfTheWay) {
   const HSplineSurface truth = RandomSurface(Shape(), 1), start = RandomSurface(Shape(), 2);
   const FitTarget target = TargetOn(truth, 200);

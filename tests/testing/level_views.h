@@ -62,6 +62,16 @@ std::vector<Term> EveryTerm(std::index_sequence<I...>) {
 // One term of each kind with its defaults, and further terms with other options.
 inline std::vector<Term> AllTerms() {
   std::vector<Term> terms = EveryTerm(std::make_index_sequence<std::variant_size_v<Term>>());
+  for (Term& term : terms) {
+    if (auto* const rows = std::get_if<RowsTerm>(&term)) {
+      for (int k = 0; k < 20; ++k) {  // all over the domain
+        const double u = 0.05 + 0.225 * (k % 5), v = 0.05 + 0.3 * (k / 5);
+        rows->rows.push_back({.at = {{u, v, 0, 0, 1}}, .equals = {5, -3, 2.0 + k}});
+        rows->rows.push_back(
+            {.at = {{u, v, 1, 0, 0.5}, {1 - u, v, 0, 2, -0.1}}, .equals = {1, 0, 7}});
+      }
+    }
+  }
   terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kHuber, .loss_width_mm = 1});
   terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kCauchy, .loss_width_mm = 2});
   terms.push_back(PointTerm{.weight = 2, .loss = RobustLoss::kTukey, .loss_width_mm = 30});

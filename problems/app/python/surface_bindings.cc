@@ -105,25 +105,6 @@ py::tuple MeshAt(const HSplineSurface& surface, int per_patch) {
                         MakeArray(drawn.uv));
 }
 
-// The 16 control vertices of a level that a point depends on, as indices into the rows of the net,
-// and their weights.
-py::tuple StencilsAt(const HSplineSurface& surface, int level, const Doubles& uv, int du, int dv) {
-  if (level < 0 || level > surface.shape().max_level) {
-    throw InputError(fmt::format("level {}: the surface has the levels 0 to {}", level,
-                                 surface.shape().max_level));
-  }
-  const std::vector<Vec2> at = Points2(uv, "uv");
-  const py::ssize_t rows = std::ssize(at);
-  Indices indices({rows, py::ssize_t{16}});
-  Doubles weights({rows, py::ssize_t{16}});
-  for (py::ssize_t k = 0; k < rows; ++k) {
-    const Stencil stencil = surface.StencilAt(level, at[k], {du, dv});
-    std::copy(stencil.index.begin(), stencil.index.end(), indices.mutable_data(k));
-    std::copy(stencil.weight.begin(), stencil.weight.end(), weights.mutable_data(k));
-  }
-  return py::make_tuple(indices, weights);
-}
-
 // Writes the surface in the format of the path's ending: .hspline.json without loss, or a format of
 // other programs.
 void WriteAnyFormat(const HSplineSurface& surface, const std::string& path,
@@ -162,7 +143,6 @@ void BindSurface(py::module_& module) {
       .def("derivatives", &DerivativesAt, py::arg("uv"), py::arg("du"), py::arg("dv"))
       .def("project", &Project, py::arg("points"))
       .def("mesh", &MeshAt, py::arg("per_patch"))
-      .def("stencils", &StencilsAt, py::arg("level"), py::arg("uv"), py::arg("du"), py::arg("dv"))
       .def("net", &NetArray, py::arg("level"))
       .def("set_net", set_net, py::arg("level"), py::arg("net"))
       .def("edit", edit, py::arg("script"))

@@ -7,10 +7,10 @@ from ._semblance import __version__
 from .errors import ConfigError, InputError, IoError, PluginError, UnknownOptionError
 from .experiments import interpolate, run, study
 from .plugins import DepthInput, Metric, Scheme, load_plugins, metric, scheme
-from .points import PointFit, fit, fit_options
+from .points import PointFit, fit, fit_options, rows_term
 from .regressor import SurfaceRegressor
 from .results import FACE_PARTS, Result
-from .surface import HSpline, fit_rows
+from .surface import HSpline
 
 __all__ = ["ConfigError", "DepthInput", "FACE_PARTS", "HSpline", "InputError", "IoError", "Metric", "PluginError", "PointFit", "Result", "Scheme",
-           "SurfaceRegressor", "UnknownOptionError", "fit", "fit_options", "fit_rows", "interpolate", "load_plugins", "metric", "run", "scheme", "study"]
+           "SurfaceRegressor", "UnknownOptionError", "fit", "fit_options", "interpolate", "load_plugins", "metric", "rows_term", "run", "scheme", "study"]

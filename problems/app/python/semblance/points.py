@@ -158,3 +158,39 @@ def _floats(values):
 def fit_options() -> str:
     """Describe every option of `fit`: path, type, default, range, unit and meaning."""
     return _semblance.fit_options()
+
+
+def rows_term(uv, equals, du=0, dv=0, coefficients=None, weight: float = 1.0) -> dict:
+    """Make a term of the fit of linear equations, for ``fit={"terms": [...]}``.
+
+    Row k states that ``sum_j coefficients[k, j] * D S(uv[k, j])`` equals ``equals[k]``, where D is the derivative of
+    order du in u and dv in v. Its cost is `weight` times the mean over the rows of the squared difference. A function
+    of yours that is called per residual would be far slower.
+
+    Parameters
+    ----------
+    uv : array of shape (n, 2) or (n, m, 2)
+        One or m places per row, in [0, 1].
+    equals : array of shape (n, 3)
+        Right-hand sides in mm.
+    du, dv : int or arrays of shape (n, m)
+        Orders, at most 2 in all; 0 and 0 is the point itself.
+    coefficients : array of shape (n, m), optional
+        Default: 1.
+
+    Examples
+    --------
+    >>> flat = rows_term([[0.0, v] for v in (0.2, 0.5, 0.8)], np.zeros((3, 3)), du=2)
+    >>> fit(points, uv, fit={"plan": "adaptive", "terms": ["points", flat]})
+    """
+    uv = np.asarray(uv, float)
+    uv = uv[:, None] if uv.ndim == 2 else uv
+    equals = np.asarray(equals, float)
+    if uv.ndim != 3 or uv.shape[2] != 2 or equals.shape != (len(uv), 3):
+        raise InputError(f"uv has the shape {uv.shape} and equals {equals.shape}; expected n x m x 2 and n x 3")
+    ones = np.ones(uv.shape[:2])
+    entries = np.concatenate([uv, np.stack([ones * du, ones * dv, ones * (1 if coefficients is None else np.asarray(coefficients, float))], -1)], axis=2)
+    for name, array in (("uv or coefficients", entries), ("equals", equals)):
+        if not np.isfinite(array).all():
+            raise InputError(f"{name}: row {np.argwhere(~np.isfinite(array))[0][0]} is not finite")
+    return {"type": "rows", "weight": float(weight), "rows": [{"at": at, "equals": right} for at, right in zip(entries.tolist(), equals.tolist())]}

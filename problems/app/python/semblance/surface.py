@@ -96,17 +96,6 @@ class HSpline:
         """Return (vertices, triangles, uv), with per_patch quads along each side of a finest patch."""
         return self._surface.mesh(per_patch)
 
-    def stencils(self, level: int, uv, du: int = 0, dv: int = 0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the linear form of points, or of derivatives, of one level.
-
-        Returns
-        -------
-        indices, weights : arrays of shape (n, 16)
-            The point at row k is ``sum(weights[k, j] * net(level).reshape(-1, 3)[indices[k, j]])``.
-            Rows of a linear fit are made of them; see `semblance.fit_rows`.
-        """
-        return self._surface.stencils(level, _domain(uv, False), du, dv)
-
     def net(self, level: int) -> np.ndarray:
         """Return the control vertices of a level, rows x columns x 3: positions in mm that include coarser detail."""
         return self._surface.net(level)
@@ -155,64 +144,3 @@ def _domain(uv, clamp):
         if outside.size:
             raise InputError(f"uv: row {outside[0]} is {uv[outside[0]].tolist()}, outside [0, 1]; clamp=True moves it to the border")
     return uv
-
-
-def fit_rows(surface: HSpline, level: int, rows, right, smoothness: float = 1e-6) -> HSpline:
-    """Change one level of a surface so that linear equations of its control vertices hold best.
-
-    Minimises ``|rows @ c - right|^2 + smoothness * |second differences of (c - c0)|^2``, where c are the control
-    vertices of the level and c0 the present ones. A function of yours that is called per residual would be far too
-    slow for this; rows and right-hand sides are not.
-
-    Parameters
-    ----------
-    rows : array or SciPy sparse matrix of shape (m, vertices)
-        Coefficients of the level's control vertices, in the order of ``net(level).reshape(-1, 3)``. `HSpline.stencils`
-        gives those of points and derivatives.
-    right : array of shape (m, 3)
-        Right-hand sides, in the unit of the rows' values.
-    smoothness : float
-        Weight of the change's bending. More keeps the change smoother; 0 requires rows that determine every vertex.
-
-    Returns
-    -------
-    HSpline
-        A changed copy.
-    """
-    net = surface.net(level)
-    count = net.shape[0] * net.shape[1]
-    rows = np.asarray(rows.todense() if hasattr(rows, "todense") else rows, float)
-    right = np.asarray(right, float)
-    if rows.ndim != 2 or rows.shape[1] != count:
-        raise InputError(f"rows have the shape {rows.shape}; level {level} has {count} vertices, so they must be m x {count}")
-    if right.shape != (len(rows), 3):
-        raise InputError(f"right has the shape {right.shape}; it must be {len(rows)} x 3, one line per row")
-    for name, array in (("rows", rows), ("right", right)):
-        if not np.isfinite(array).all():
-            raise InputError(f"{name}: row {np.argwhere(~np.isfinite(array))[0][0]} is not finite")
-    if not smoothness >= 0:
-        raise InputError(f"smoothness is {smoothness}; it must be 0 or more")
-    bending = _second_differences(*net.shape[:2])
-    change = _least_squares(np.vstack([rows, np.sqrt(smoothness) * bending]),
-                            np.vstack([right - rows @ net.reshape(-1, 3), np.zeros((len(bending), 3))]))
-    result = surface.copy()
-    result.set_net(level, net + change.reshape(net.shape))
-    return result
-
-
-def _least_squares(rows, right):
-    change, _, rank, _ = np.linalg.lstsq(rows, right, rcond=None)
-    if rank < rows.shape[1]:
-        raise InputError(f"the rows determine {rank} of {rows.shape[1]} vertices; add rows, or take smoothness above 0")
-    return change
-
-
-def _second_differences(rows, columns):
-    """Second differences along both sides of a net, and a small pull of each vertex to its present place."""
-    index = np.arange(rows * columns).reshape(rows, columns)
-    triples = [np.stack([index[2:], index[1:-1], index[:-2]], -1).reshape(-1, 3),
-               np.stack([index[:, 2:], index[:, 1:-1], index[:, :-2]], -1).reshape(-1, 3)]
-    triples = np.concatenate(triples)
-    bending = np.zeros((len(triples), index.size))
-    np.put_along_axis(bending, triples, np.array([1.0, -2.0, 1.0]), axis=1)
-    return np.vstack([bending, 1e-3 * np.eye(index.size)])

@@ -142,27 +142,6 @@ class Surface(unittest.TestCase):
             with self.assertRaises(semblance.InputError):
                 surface.write(os.path.join(folder, "s.txt"))
 
-    def test_stencils_are_the_linear_form_of_points_and_derivatives(self):
-        surface = semblance.HSpline(plane_net() + np.random.default_rng(6).normal(size=(5, 6, 3)), max_level=1)
-        uv = np.random.default_rng(7).random((30, 2))
-        for du, dv in ((0, 0), (1, 0), (0, 2)):
-            index, weight = surface.stencils(1, uv, du, dv)
-            np.testing.assert_allclose((weight[..., None] * surface.net(1).reshape(-1, 3)[index]).sum(axis=1), surface.derivatives(uv, du, dv), atol=1e-9)
-
-    def test_linear_rows_of_points_bring_the_surface_to_them(self):
-        surface = semblance.HSpline(plane_net())
-        uv = np.random.default_rng(8).random((200, 2))
-        wanted = surface.points(uv) + np.column_stack([0 * uv[:, 0], 0 * uv[:, 0], 3 + 2 * uv[:, 0] * uv[:, 1]])
-        index, weight = surface.stencils(0, uv)
-        rows = np.zeros((len(uv), 30))
-        np.put_along_axis(rows, index, weight, axis=1)
-        fitted = semblance.fit_rows(surface, 0, rows, wanted, smoothness=1e-12)
-        np.testing.assert_allclose(fitted.points(uv), wanted, atol=1e-4)
-        with self.assertRaisesRegex(semblance.InputError, "rows have the shape"):
-            semblance.fit_rows(surface, 0, rows[:, 1:], wanted)
-        with self.assertRaisesRegex(semblance.InputError, "determine 16 of 30"):
-            semblance.fit_rows(surface, 0, rows[:16], wanted[:16], smoothness=0)
-
 
 class Fit(unittest.TestCase):
     def test_a_paraboloid_within_the_tolerance(self):
@@ -221,6 +200,27 @@ class Fit(unittest.TestCase):
         sigma = random.uniform(0.1, 0.3, 961)
         one, two = semblance.fit(points, sigma_of_points=sigma), semblance.fit(points, weights=1 / sigma**2)
         np.testing.assert_allclose(one.surface.net(0), two.surface.net(0), atol=1e-9)
+
+    def test_a_term_of_linear_rows_holds_derivatives_and_sums(self):
+        points = paraboloid(31)
+        uv = (points[:, :2] + 20) / 40
+        border = np.column_stack([np.zeros(9), np.linspace(0.1, 0.9, 9)])
+        slope = np.tile([40.0, 0, 0], (9, 1))  # dS/du without a slope in z, where the paraboloid has one
+        options = lambda terms: {"plan": {"type": "adaptive", "tolerance_mm": 0.01, "finest": 1}, "terms": ["points", *terms]}
+        free = semblance.fit(points, uv, patches_u=4, patches_v=4, fit=options([])).surface
+        held = semblance.fit(points, uv, patches_u=4, patches_v=4, fit=options([semblance.rows_term(border, slope, du=1, weight=1e5)])).surface
+        np.testing.assert_allclose(free.derivatives(border, 1, 0)[:, 2], -16, atol=0.5)
+        np.testing.assert_allclose(held.derivatives(border, 1, 0), slope, atol=0.05)
+        # The two ends of a line stay as far apart in z as the row states.
+        ends = np.array([[[0.0, 0.5], [1.0, 0.5]]])
+        apart = semblance.rows_term(ends, [[-40, 0, 3]], coefficients=[[1, -1]], weight=1e5)
+        tilted = semblance.fit(points, uv, patches_u=4, patches_v=4, fit=options([apart])).surface
+        a, b = tilted.points(ends[0])
+        self.assertAlmostEqual(a[2] - b[2], 3, delta=0.01)
+        with self.assertRaisesRegex(semblance.InputError, "row 0: .u,v. is not in 0..1"):
+            semblance.fit(points, uv, fit=options([semblance.rows_term([[1.5, 0]], [[0, 0, 0]])]))
+        with self.assertRaisesRegex(semblance.InputError, "expected n x m x 2 and n x 3"):
+            semblance.rows_term(border, slope[1:])
 
     def test_wrong_rows_are_reported(self):
         points = paraboloid(9)
