@@ -120,8 +120,11 @@ TEST(PlanLaws, BothSolversFindTheSameSurfaceAndNoneMakesTheTermsDearer) {
         EXPECT_EQ(fastest.levels.back().solver, "direct");
       }
       EXPECT_EQ(ceres.surface.Offsets().size(), fastest.surface.Offsets().size());
-      // A term towards the start of a solve depends on the solves before.
-      const double near = std::holds_alternative<PriorTerm>(term) ? 1e-5 : 1e-6;
+      // A term towards the start of a solve depends on the solves before. Rows that contradict the
+      // points leave a cost, and Ceres stops by the relative change of the cost.
+      const bool is_loose =
+          std::holds_alternative<PriorTerm>(term) || std::holds_alternative<RowsTerm>(term);
+      const double near = is_loose ? 1e-5 : 1e-6;
       EXPECT_LT(LargestDistance(ceres.surface, fastest.surface), HasLoss(term) ? 1e-3 : near);
       EXPECT_NEAR(CostAfter(ceres), CostAfter(fastest), 1e-6 * CostAfter(fastest));
       EXPECT_GT(LargestDistance(ceres.surface, start), 0.1);
