@@ -10,9 +10,8 @@ namespace {
 
 // A choice that is no scheme of the dowels alone.
 template <class Scheme>
-constexpr bool IsApart =
-    std::is_same_v<Scheme, PopulationDepth> || std::is_same_v<Scheme, DepthMap> ||
-    std::is_same_v<Scheme, ExternalScheme>;
+constexpr bool IsApart = std::is_same_v<Scheme, PopulationDepth> ||
+                         std::is_same_v<Scheme, DepthMap> || std::is_same_v<Scheme, ExternalScheme>;
 
 }  // namespace
 

@@ -19,12 +19,14 @@ struct DepthMap {
 };
 template <class Visitor>
 void Fields(Visitor& visit, DepthMap& o) {
-  visit(FieldInfo{.name = "file",
-                  .doc = "depth per vertex: a PLY whose vertices have the scalar, e.g. depth.ply "
-                         "of a run, or a CSV with the scalar's name in its first line and a line "
-                         "per vertex; above 0, or nan for no depth. In a study {subject} stands for the "
-                         "subject's name, e.g. maps/{subject}.ply"},
-        o.file);
+  visit(
+      FieldInfo{.name = "file",
+                .doc =
+                    "depth per vertex: a PLY whose vertices have the scalar, e.g. depth.ply "
+                    "of a run, or a CSV with the scalar's name in its first line and a line "
+                    "per vertex; above 0, or nan for no depth. In a study {subject} stands for the "
+                    "subject's name, e.g. maps/{subject}.ply"},
+      o.file);
   visit(FieldInfo{.name = "scalar", .doc = "name of the PLY's vertex property or the CSV's column"},
         o.scalar);
   visit(FieldInfo{.name = "mesh",

@@ -39,7 +39,8 @@ static_assert(
 
 // Every scheme with its defaults, except those that do not live by the dowels alone: population,
 // which needs a face's bone (population_depth_test), a map, which comes from a file
-// (depth_map_test), and a scheme of the caller (external_scheme_test). Then with options that change the method.
+// (depth_map_test), and a scheme of the caller (external_scheme_test). Then with options that
+// change the method.
 std::vector<DepthScheme> Schemes() {
   std::vector<DepthScheme> schemes = Defaults(std::make_index_sequence<kAlternatives>{});
   const DowelDistance along = DowelDistance::kGeodesic;
