@@ -5,27 +5,37 @@
 
 #include <algorithm>
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <filesystem>
+#include <limits>
+#include <optional>
 #include <string>
+#include <thread>
 #include <utility>
 #include <vector>
 
 #include "problems/app/exit_code.h"
+#include "problems/app/live_study.h"
 #include "problems/app/shard.h"
+#include "problems/app/workbench/http_server.h"
 #include "problems/config/terminal_text.h"
 #include "problems/io/staged_folder.h"
+#include "problems/report/plain_names.h"
 #include "problems/study/report/comparison_files.h"
 #include "problems/study/report/study_comparison.h"
 #include "problems/study/report/study_ranking.h"
 #include "problems/study/report/study_report.h"
 #include "problems/study/study_run.h"
 #include "problems/study/study_submit.h"
+#include "surfaces/base/error.h"
 
 namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr std::size_t kListedTrials = 20;  // unfinished trials that `study` and `merge` list
 
 // The arguments of all study commands. Each command reads its part.
 struct StudyArguments {
@@ -33,7 +43,9 @@ struct StudyArguments {
   std::string out, shard;
   std::string rerun, metric, better;
   bool force = false;
-  bool quiet = false, list = false, slurm = false, ranks = false;
+  std::string pairs = "all";
+  bool quiet = false, list = false, slurm = false, ranks = false, missing = false, serve = false;
+  int port = 0;
   StudyRunOptions run;
   SubmitOptions submit;
   std::stop_token stop;
@@ -76,24 +88,42 @@ int FindExitCode(const StudyResults& results) {
              : kNotUsable;
 }
 
-// Prints the state of a study's folder, and how to continue.
-int PrintStudyState(const StudyResults& results, const fs::path& root) {
-  for (const TrialRow& row : results.trials) {
-    if (row.status == "failed" || row.status == "missing" || row.status == "damaged") {
-      Tell("{}: {} {} | {}{}{}\n", row.status, row.id, row.subject, fmt::join(row.values, " | "),
-           row.reason.empty() ? "" : ": ", row.reason);
-    }
-  }
-  Tell("{}", RankingText(results));
-  if (const std::string unusable = UnusableText(results); !unusable.empty()) {
-    Tell("{}\n", unusable);
-  }
-  PrintVersions(results);
+void PrintCounts(const StudyResults& results) {
   const int damaged = results.Count("damaged");
   Tell("{} of {} trials done, {} unusable, {} failed, {} missing{}\n", results.Count("done"),
        results.trials.size(), results.Count("unusable"), results.Count("failed"),
        results.Count("missing"),
        damaged > 0 ? fmt::format(", {} damaged; run the study again", damaged) : "");
+}
+
+// Lists the trials without numbers, one per line, and counts those beyond `most`.
+void PrintUnfinished(const StudyResults& results, std::size_t most, const fs::path& root) {
+  std::size_t count = 0;
+  for (const TrialRow& row : results.trials) {
+    if (row.status == "failed" || row.status == "missing" || row.status == "damaged") {
+      ++count;
+      if (count <= most) {
+        Tell("{}: {} {} | {}{}{}\n", row.status, row.id, row.subject, fmt::join(row.values, " | "),
+             row.reason.empty() ? "" : ": ", row.reason);
+      }
+    }
+  }
+  if (count > most) {
+    Tell("{} no numbers; semblance status {} --missing lists all\n",
+         Counted(static_cast<long long>(count), "trial has", "trials have"), root.string());
+  }
+}
+
+// Prints the state of a study's folder, and how to continue. The summary comes first; `most` is the
+// number of unfinished trials to list.
+int PrintStudyState(const StudyResults& results, const fs::path& root, std::size_t most) {
+  PrintCounts(results);
+  Tell("{}", RankingText(results));
+  if (const std::string unusable = UnusableText(results); !unusable.empty()) {
+    Tell("{}\n", unusable);
+  }
+  PrintVersions(results);
+  PrintUnfinished(results, most, root);
   if (fs::exists(root / "report.html")) {
     Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
   } else {
@@ -123,15 +153,32 @@ int PrintPartState(const StudyResults& results, const std::vector<bool>& selecte
   return CheckMetric(results) && done == count ? kDone : kNotUsable;
 }
 
-// Runs a study and shows its progress on the terminal, unless --quiet.
-StudySummary RunWithProgress(const StudyPlan& plan, const fs::path& root, StudyRunOptions options,
-                             const StudyArguments& a) {
-  StudyProgress progress(stderr);
-  if (!a.quiet) {
-    options.on_progress = [&progress](const StudyEta& eta, const std::string& trial) {
-      progress(eta, trial);
-    };
+// Shows a study in the browser as long as it lives.
+class StudyServer {
+ public:
+  StudyServer(LiveStudy& live, int port)
+      : server_([&live](const PageRequest& request) { return live.Answer(request); },
+                {.port = port, .token = {}, .limits = {}}),
+        serving_([this](const std::stop_token& stop) { server_.Serve(stop); }) {
+    Tell("open in a browser on this machine: {}\n", server_.Url());
+    std::fflush(stdout);
   }
+
+ private:
+  HttpServer server_;
+  std::jthread serving_;
+};
+
+// Runs a study and shows its progress on the terminal, unless --quiet, and on the live page.
+StudySummary RunWithProgress(const StudyPlan& plan, const fs::path& root, StudyRunOptions options,
+                             const StudyArguments& a, LiveStudy& live) {
+  StudyProgress progress(stderr);
+  options.on_progress = [&](const StudyEta& eta, const std::string& trial) {
+    live.Update(eta, trial);
+    if (!a.quiet) {
+      progress(eta, trial);
+    }
+  };
   RunContext context;
   context.stop_token = a.stop;
   return RunStudy(plan, root, options, context);
@@ -170,6 +217,12 @@ void PrintShard(const StudySummary& summary, const StudyRunOptions& options) {
       options.shard, options.shards, summary.trials, summary.skipped, summary.done, summary.failed);
 }
 
+// Gives an open page the time to take the last report.
+void EndLivePage(LiveStudy& live) {
+  live.End();
+  live.WaitForPage(std::chrono::seconds(5));
+}
+
 int StudyCommand(const StudyArguments& a) {
   const bool plan_only = a.list || (a.files.size() == 2 && a.files[0] == "plan");
   if (a.files.size() == 2 && !plan_only) {
@@ -188,15 +241,22 @@ int StudyCommand(const StudyArguments& a) {
     return PrintPlan(plan, options.only);
   }
   const fs::path root = a.out.empty() ? "out/" + file.stem().string() : a.out;
-  const StudySummary summary = RunWithProgress(plan, root, options, a);
+  LiveStudy live(plan.title, root);
+  std::optional<StudyServer> server;
+  if (a.serve) {
+    server.emplace(live, a.port);
+  }
+  const StudySummary summary = RunWithProgress(plan, root, options, a, live);
   PrintChange(summary, root);
   if (options.shards > 1) {
     PrintShard(summary, options);
+    EndLivePage(live);
     return kDone;
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   const StudyResults results = WriteStudyTables(folder);
-  return options.only.empty() ? PrintStudyState(results, root)
+  EndLivePage(live);
+  return options.only.empty() ? PrintStudyState(results, root, kListedTrials)
                               : PrintPartState(results, SelectTrials(plan, options.only), root);
 }
 
@@ -210,16 +270,20 @@ int MergeCommand(const StudyArguments& a) {
   }
   OutputFolder folder(root, WhenNotEmpty::kReplaceFiles);
   const StudyResults results = WriteStudyTables(folder);
-  return a.quiet ? FindExitCode(results) : PrintStudyState(results, root);
+  return a.quiet ? FindExitCode(results) : PrintStudyState(results, root, kListedTrials);
 }
 
 int StatusCommand(const StudyArguments& a) {
   const fs::path root = a.files.at(0);
-  return PrintStudyState(ReadStudyResults(root), root);
+  constexpr auto kAll = std::numeric_limits<std::size_t>::max();
+  return PrintStudyState(ReadStudyResults(root), root, a.missing ? kAll : 0);
 }
 
 int CompareCommand(const StudyArguments& a) {
-  CompareOptions options{.metric = a.metric, .better = std::nullopt};
+  CompareOptions options{
+      .metric = a.metric,
+      .better = std::nullopt,
+      .pairs = a.pairs == "matched" ? ComparedPairs::kMatched : ComparedPairs::kAll};
   if (!a.better.empty()) {
     options.better = a.better == "higher"    ? Better::kHigher
                      : a.better == "nearest" ? Better::kNearest
@@ -227,6 +291,9 @@ int CompareCommand(const StudyArguments& a) {
   }
   const std::vector<NamedStudy> studies = ReadStudies({a.files.begin(), a.files.end()});
   if (a.ranks) {
+    if (studies.size() < 2) {
+      throw InputError("--ranks compares the order of treatments in two studies; give two folders");
+    }
     for (std::size_t k = 1; k < studies.size(); ++k) {
       Tell("{}", RankText(CompareRanks(studies.front(), studies[k], options)));
     }
@@ -283,6 +350,11 @@ void DeclareStudy(CLI::App& study, CommandLine& line) {
                   "that another version or build of the program made; all")
       ->check(CLI::IsMember({"failed", "unusable", "other-versions", "all"}));
   study.add_flag("--quiet", a.quiet, "do not show progress");
+  CLI::Option* const serve = study.add_flag(
+      "--serve", a.serve, "show a live page in a browser on this machine while the study runs");
+  study.add_option("--port", a.port, "port of 127.0.0.1 for --serve [any free one]")
+      ->check(CLI::Range(0, 65535))
+      ->needs(serve);
 }
 
 void DeclareSubmit(CLI::App& submit, CommandLine& line) {
@@ -315,15 +387,16 @@ void DeclareMerge(CLI::App& merge, CommandLine& line) {
 void DeclareStatus(CLI::App& status, CommandLine& line) {
   StudyArguments& a = *Bind(status, line, &StatusCommand);
   status.add_option("DIR", a.files, "folder of the study")->required()->expected(1);
+  status.add_flag("--missing", a.missing,
+                  "list the trials that are missing, failed or damaged, each with its reason");
 }
 
 void DeclareCompare(CLI::App& compare, CommandLine& line) {
   StudyArguments& a = *Bind(compare, line, &CompareCommand);
   compare
-      .add_option("DIR", a.files,
-                  "folders of two studies or more; the others are compared with the first")
+      .add_option("DIR", a.files, "folders of one study or more, over the subjects that all have")
       ->required()
-      ->expected(2, 100);
+      ->expected(1, 100);
   compare.add_option("--metric", a.metric,
                      "number of result.json by its path; default: the metric of the first study");
   compare
@@ -332,6 +405,13 @@ void DeclareCompare(CLI::App& compare, CommandLine& line) {
                   "within a distance, nearest to 0 for signed errors, nearest to the stated share "
                   "for coverage, lower for all others")
       ->check(CLI::IsMember({"lower", "higher", "nearest"}));
+  compare
+      .add_option(
+          "--pairs", a.pairs,
+          "all: every two treatments; matched: each treatment of a later study with the one "
+          "of the same name in the first study, else with the best of the first")
+      ->check(CLI::IsMember({"all", "matched"}))
+      ->capture_default_str();
   CLI::Option* const out =
       compare.add_option("--out", a.out, "folder for pairs.csv, values.csv and report.html");
   compare
@@ -352,7 +432,7 @@ std::span<const ProgramCommand> StudyCommands() {
                      &DeclareSubmit},
       ProgramCommand{"merge", "make the tables and the report of a study from its shards",
                      &DeclareMerge},
-      ProgramCommand{"compare", "compare the treatments of studies over the subjects they share",
+      ProgramCommand{"compare", "compare treatments in pairs, over the subjects they share",
                      &DeclareCompare},
       ProgramCommand{"status", "show the progress of a study", &DeclareStatus},
   };

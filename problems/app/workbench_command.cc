@@ -20,6 +20,7 @@
 #include "problems/app/exit_code.h"
 #include "problems/app/program_end.h"
 #include "problems/app/work_options.h"
+#include "problems/app/workbench/bench_api.h"
 #include "problems/app/workbench/http_server.h"
 #include "problems/config/terminal_text.h"
 #include "problems/io/output_folder.h"
@@ -95,15 +96,16 @@ std::unique_ptr<HttpServer> Listen(Bench& bench, int port) {
   HttpServerOptions options{.port = port != 0 ? port : last.port,
                             .token = last.token.empty() ? RandomToken() : last.token,
                             .limits = {}};
+  const AnswerPage answer = [&bench](const PageRequest& request) { return Answer(bench, request); };
   std::unique_ptr<HttpServer> server;
   try {
-    server = std::make_unique<HttpServer>(bench, options);
+    server = std::make_unique<HttpServer>(answer, options);
   } catch (const IoError&) {
     if (port != 0 || last.port == 0) {
       throw;
     }
     options.port = 0;
-    server = std::make_unique<HttpServer>(bench, options);
+    server = std::make_unique<HttpServer>(answer, options);
   }
   StoreAddress(bench.Folder(), {server->Port(), options.token});
   return server;

@@ -318,6 +318,25 @@ std::string TrialsCsv(const StudyResults& results) {
   return csv.Text();
 }
 
+std::string TrialsWideCsv(const StudyResults& results) {
+  const std::set<std::string> metrics = CollectMetrics(results);
+  std::vector<std::string> columns = {"trial", "subject"};
+  columns.insert(columns.end(), results.axes.begin(), results.axes.end());
+  columns.insert(columns.end(), {"status", "reason"});
+  columns.insert(columns.end(), metrics.begin(), metrics.end());
+  CsvWriter csv(columns);
+  for (const TrialRow& row : results.trials) {
+    csv.Add(row.id, row.subject, row.values, row.status, row.reason);
+    auto next = row.metrics.begin();  // both are in the order of the names
+    for (const std::string& metric : metrics) {
+      const bool has = next != row.metrics.end() && next->first == metric;
+      csv.Add(has ? (next++)->second : kNaN);
+    }
+    csv.EndRow();
+  }
+  return csv.Text();
+}
+
 namespace {
 
 // Walks through the metrics in the order of their names, for all trials at once. One pass is much
@@ -350,22 +369,62 @@ class MetricWalk {
 
 }  // namespace
 
+namespace {
+
+// The subjects that each treatment with any value has.
+std::set<std::string> FindCommon(const std::vector<std::map<std::string, double>>& by_subject) {
+  std::map<std::string, std::size_t> count;
+  std::size_t treatments = 0;
+  for (const auto& values : by_subject) {
+    treatments += values.empty() ? 0 : 1;
+    for (const auto& [subject, value] : values) {
+      ++count[subject];
+    }
+  }
+  std::set<std::string> common;
+  for (const auto& [subject, times] : count) {
+    if (times == treatments) {
+      common.insert(subject);
+    }
+  }
+  return common;
+}
+
+double MeanOver(const std::map<std::string, double>& values,
+                const std::set<std::string>& subjects) {
+  double sum = 0;
+  int count = 0;
+  for (const auto& [subject, value] : values) {
+    sum += subjects.contains(subject) ? value : 0;
+    count += subjects.contains(subject) ? 1 : 0;
+  }
+  return count > 0 ? sum / count : kNaN;
+}
+
+}  // namespace
+
 std::string SummaryCsv(const StudyResults& results) {
   std::vector<std::string> columns = results.axes;
   columns.insert(columns.end(), {"metric", "n", "mean", "sd", "median", "min", "max", "mean_low_95",
-                                 "mean_high_95", "unusable"});
+                                 "mean_high_95", "unusable", "n_common", "mean_common"});
   CsvWriter csv(columns);
   const std::vector<Treatment> treatments = Treatments(results, results.metric);
   MetricWalk walk(results);
   for (const std::string& metric : CollectMetrics(results)) {
+    std::vector<std::map<std::string, double>> by_subject;
     for (const Treatment& treatment : treatments) {
+      by_subject.push_back(walk.Next(treatment, metric));
+    }
+    const std::set<std::string> common = FindCommon(by_subject);
+    for (std::size_t n = 0; n < treatments.size(); ++n) {
       std::vector<double> values;
-      for (const auto& [subject, value] : walk.Next(treatment, metric)) {
+      for (const auto& [subject, value] : by_subject[n]) {
         values.push_back(value);
       }
       const SampleSummary s = Summarize(values);
-      csv.Row(treatment.values, metric, s.n, s.mean, s.sd, s.median, s.min, s.max, s.mean_95.low,
-              s.mean_95.high, treatment.unusable);
+      csv.Row(treatments[n].values, metric, s.n, s.mean, s.sd, s.median, s.min, s.max,
+              s.mean_95.low, s.mean_95.high, treatments[n].unusable, common.size(),
+              MeanOver(by_subject[n], common));
     }
   }
   return csv.Text();

@@ -80,12 +80,18 @@ std::vector<Treatment> Treatments(const StudyResults& results, const std::string
 // Writes trials.csv, with one line per number in the order of the plan: trial, subject, the axes,
 // status, reason, metric, value.
 std::string TrialsCsv(const StudyResults& results);
+// Writes trials_wide.csv, with one line per trial in the order of the plan: trial, subject, the
+// axes, status, reason, then a column for each metric that any trial has, sorted by name. A number
+// that a trial lacks is an empty cell.
+std::string TrialsWideCsv(const StudyResults& results);
 // One line on the trials whose results are not usable, by treatment: no ranking, mean or test
 // counts them. Empty if there are none.
 std::string UnusableText(const StudyResults& results);
 
 // Writes summary.csv: the axes, metric, n, mean, sd, median, min, max, the bootstrap's 95 %
-// interval of the mean over subjects, and the number of trials that are left out as not usable.
+// interval of the mean over subjects, the number of trials that are left out as not usable, and the
+// number of subjects that all treatments with this metric have (n_common), with the mean over them:
+// only this mean may be compared if trials are missing.
 std::string SummaryCsv(const StudyResults& results);
 
 }  // namespace semblance::problems

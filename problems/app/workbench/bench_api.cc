@@ -37,10 +37,10 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kJson = "application/json";
 
-BenchReply JsonReply(std::string body) { return {200, kJson, std::move(body), {}}; }
+PageReply JsonReply(std::string body) { return {200, kJson, std::move(body), {}}; }
 
 // Cuts the message, because it may quote a request of any length.
-BenchReply MessageReply(int status, const char* key, const std::string& message) {
+PageReply MessageReply(int status, const char* key, const std::string& message) {
   constexpr std::size_t kMaxMessage_bytes = 2000;
   return {status,
           kJson,
@@ -50,21 +50,19 @@ BenchReply MessageReply(int status, const char* key, const std::string& message)
 }
 
 // The reply to a request that the page never makes.
-BenchReply ErrorReply(int status, const std::string& message) {
+PageReply ErrorReply(int status, const std::string& message) {
   return MessageReply(status, "error", message);
 }
 
 // The reply to a person's action that is impossible. Its status is 200, because a browser lists
 // each status from 400 on as a fault of the page.
-BenchReply RefusalReply(const std::string& message) {
-  return MessageReply(200, "refused", message);
-}
+PageReply RefusalReply(const std::string& message) { return MessageReply(200, "refused", message); }
 
 class BadRequest : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-Json ParseBody(const BenchRequest& request) {
+Json ParseBody(const PageRequest& request) {
   try {
     return ParseJson(request.body, "the request");
   } catch (const IoError& error) {
@@ -72,7 +70,7 @@ Json ParseBody(const BenchRequest& request) {
   }
 }
 
-BenchReply StateReply(Bench& bench) {
+PageReply StateReply(Bench& bench) {
   return JsonReply(SnapshotJson(bench.TakeSnapshot(), bench.Folder()));
 }
 
@@ -96,7 +94,7 @@ const char* ContentType(const std::string& name) {
 }
 
 // Serves only files that are part of the program. No name leads to the disk.
-BenchReply PageFile(const std::string& path) {
+PageReply PageFile(const std::string& path) {
   const std::string name = path.empty() ? "index.html" : path;
   if (name == "three.js") {
     return {200, ContentType(name), std::string(ThreeScript()), {}};
@@ -116,7 +114,7 @@ BenchReply PageFile(const std::string& path) {
 }
 
 // Serves a file of the last run, never one outside run/.
-BenchReply RunFile(const Bench& bench, const std::string& name) {
+PageReply RunFile(const Bench& bench, const std::string& name) {
   const fs::path root = bench.Folder() / "run";
   std::error_code error;
   const fs::path path = fs::canonical(root / name, error);
@@ -132,29 +130,29 @@ BenchReply RunFile(const Bench& bench, const std::string& name) {
 // Requests that change nothing
 // ---------------------------------------------------------------------------------------------
 
-BenchReply Meshes(Bench& bench, const BenchRequest&) {
+PageReply Meshes(Bench& bench, const PageRequest&) {
   return JsonReply(MeshesJson(*bench.TakeSnapshot().subject));
 }
 
-BenchReply Sites(Bench&, const BenchRequest&) { return JsonReply(SitesJson()); }
+PageReply Sites(Bench&, const PageRequest&) { return JsonReply(SitesJson()); }
 
-BenchReply SitesPicture(Bench&, const BenchRequest&) {
+PageReply SitesPicture(Bench&, const PageRequest&) {
   static const std::string kPicture = SitePictureSvg(/*threads=*/1);
   return {200, "image/svg+xml", kPicture, {}};
 }
 
-std::string QueryText(const BenchRequest& request, const char* key) {
+std::string QueryText(const PageRequest& request, const char* key) {
   const auto at = request.query.find(key);
   return at == request.query.end() ? std::string() : at->second;
 }
 
 // Picture of the place of one site, for ?site=CODE.
-BenchReply SitePictureReply(Bench&, const BenchRequest& request) {
+PageReply SitePictureReply(Bench&, const PageRequest& request) {
   static const SiteSketch kSketch = MakeSiteSketch(/*threads=*/1);
   return {200, "image/png", EncodePng(DrawSitePicture(kSketch, QueryText(request, "site"))), {}};
 }
 
-BenchReply Schema(Bench&, const BenchRequest&) { return JsonReply(OptionsSchema<Experiment>()); }
+PageReply Schema(Bench&, const PageRequest&) { return JsonReply(OptionsSchema<Experiment>()); }
 
 // pooled: the table has one build and one sex.
 Json TableJson(const fs::path& path) {
@@ -167,7 +165,7 @@ Json TableJson(const fs::path& path) {
 }
 
 // The files of the folder that options may name, the parts of the template and the kept features.
-BenchReply Files(Bench& bench, const BenchRequest&) {
+PageReply Files(Bench& bench, const PageRequest&) {
   Json json = {{"tables", Json::array()}, {"networks", Json::array()}};
   for (const auto& [kind, list] : json.items()) {
     const fs::path folder = bench.Folder() / kind;
@@ -187,14 +185,14 @@ BenchReply Files(Bench& bench, const BenchRequest&) {
   return JsonReply(json.dump());
 }
 
-BenchReply FaceReply(const BenchFace& face) { return JsonReply(FaceJson(face)); }
+PageReply FaceReply(const BenchFace& face) { return JsonReply(FaceJson(face)); }
 
-BenchVariant RequestedVariant(const BenchRequest& request) {
+BenchVariant RequestedVariant(const PageRequest& request) {
   const auto name = request.query.find("variant");
   return name == request.query.end() ? BenchVariant::kAsIs : FindVariant(name->second);
 }
 
-BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
+PageReply CoarseReply(Bench& bench, const PageRequest& request) {
   const auto path = request.query.find("path"), value = request.query.find("value");
   if (path != request.query.end() && value != request.query.end()) {
     return FaceReply(bench.CoarseWith({path->second, value->second}));
@@ -202,13 +200,13 @@ BenchReply CoarseReply(Bench& bench, const BenchRequest& request) {
   return FaceReply(bench.Coarse(RequestedVariant(request)));
 }
 
-BenchReply VariantReply(Bench& bench, const BenchRequest& request) {
+PageReply VariantReply(Bench& bench, const PageRequest& request) {
   return FaceReply(bench.FullVariant(RequestedVariant(request)));
 }
 
-BenchReply FullReply(Bench& bench, const BenchRequest&) { return FaceReply(bench.Full()); }
+PageReply FullReply(Bench& bench, const PageRequest&) { return FaceReply(bench.Full()); }
 
-BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
+PageReply LandmarksFile(Bench& bench, const PageRequest& request) {
   const auto format = request.query.find("format");
   const std::string name =
       "landmarks" + (format == request.query.end() ? std::string(".yaml") : format->second);
@@ -217,7 +215,7 @@ BenchReply LandmarksFile(Bench& bench, const BenchRequest& request) {
 }
 
 // Exports the face of the last run with its edits, or the face of a variant.
-BenchReply FaceFile(Bench& bench, const BenchRequest& request) {
+PageReply FaceFile(Bench& bench, const PageRequest& request) {
   const auto format = request.query.find("format");
   const std::string extension = format == request.query.end() ? ".ply" : format->second;
   const bool is_variant = request.query.contains("variant");
@@ -242,12 +240,12 @@ TriMesh CompleteHead(Bench& bench) {
   return ReadMesh(file);
 }
 
-BenchReply HeadReply(Bench& bench, const BenchRequest&) {
+PageReply HeadReply(Bench& bench, const PageRequest&) {
   return JsonReply(Json{{"mesh", EncodeMeshBlob(SimplifyForView(CompleteHead(bench)))}}.dump());
 }
 
 // Exports the complete head: the run's own file for .glb, which has colours, or its mesh.
-BenchReply HeadFile(Bench& bench, const BenchRequest& request) {
+PageReply HeadFile(Bench& bench, const PageRequest& request) {
   const std::string format = QueryText(request, "format");
   const TriMesh head = CompleteHead(bench);
   if (format == ".glb") {
@@ -440,7 +438,7 @@ constexpr std::array<std::pair<std::string_view, Action>, 25> kActions = {
      {"variants", &MakeVariants},
      {"cancel", &Cancel}}};
 
-BenchReply Act(Bench& bench, const BenchRequest& request) {
+PageReply Act(Bench& bench, const PageRequest& request) {
   const Json json = ParseBody(request);
   const std::string name = ReadText(json, "do");
   const auto* const found =
@@ -453,14 +451,14 @@ BenchReply Act(Bench& bench, const BenchRequest& request) {
 }
 
 // Stores a file from the browser until it is opened.
-BenchReply Upload(Bench& bench, const BenchRequest& request) {
+PageReply Upload(Bench& bench, const PageRequest& request) {
   const fs::path path = SaveIncoming(bench.Folder(), QueryText(request, "batch"),
                                      QueryText(request, "name"), request.body);
   return JsonReply(Json{{"path", path.string()}}.dump());
 }
 
 // Identifies a path on this machine or the files of an uploaded batch.
-BenchReply Identify(Bench& bench, const BenchRequest& request) {
+PageReply Identify(Bench& bench, const PageRequest& request) {
   const Json json = ParseBody(request);
   const std::string batch = ReadOptionalText(json, "batch");
   const fs::path path =
@@ -469,18 +467,18 @@ BenchReply Identify(Bench& bench, const BenchRequest& request) {
 }
 
 // The displacements of the shown vertices, for the preview of a pull.
-BenchReply PullPreview(Bench& bench, const BenchRequest& request) {
+PageReply PullPreview(Bench& bench, const PageRequest& request) {
   const Json json = ParseBody(request);
   return JsonReply(PullMovesJson(bench.PullMovesAt(ReadVector(json, "at"), ReadPull(json))));
 }
 
-BenchReply State(Bench& bench, const BenchRequest&) { return StateReply(bench); }
+PageReply State(Bench& bench, const PageRequest&) { return StateReply(bench); }
 
 // ---------------------------------------------------------------------------------------------
 // A volume before it is opened: ?path=FILE_OR_FOLDER&series=NAME
 // ---------------------------------------------------------------------------------------------
 
-BenchReply SeriesReply(Bench& bench, const BenchRequest& request) {
+PageReply SeriesReply(Bench& bench, const PageRequest& request) {
   Json json = Json::array();
   for (const VolumeSeries& series : bench.FindSeries(QueryText(request, "path"))) {
     json.push_back({{"name", series.name},
@@ -493,13 +491,13 @@ BenchReply SeriesReply(Bench& bench, const BenchRequest& request) {
   return JsonReply(json.dump());
 }
 
-std::shared_ptr<const VolumeReading> RequestedVolume(Bench& bench, const BenchRequest& request) {
+std::shared_ptr<const VolumeReading> RequestedVolume(Bench& bench, const PageRequest& request) {
   return bench.ReadUnopened(QueryText(request, "path"),
                             {.series = QueryText(request, "series"),
                              .fill_slices = QueryText(request, "fill") == "true"});
 }
 
-BenchReply VolumeReply(Bench& bench, const BenchRequest& request) {
+PageReply VolumeReply(Bench& bench, const PageRequest& request) {
   const auto reading = RequestedVolume(bench, request);
   return JsonReply(Json{
       {"is_mr", reading->modality == Modality::kMr},
@@ -509,7 +507,7 @@ BenchReply VolumeReply(Bench& bench, const BenchRequest& request) {
 }
 
 // A number of the query; `usual` if it is missing. Throws BadRequest for other texts.
-double QueryNumber(const BenchRequest& request, const char* key, double usual) {
+double QueryNumber(const PageRequest& request, const char* key, double usual) {
   const std::string text = QueryText(request, key);
   double number = usual;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
@@ -519,7 +517,7 @@ double QueryNumber(const BenchRequest& request, const char* key, double usual) {
   return number;
 }
 
-BenchReply SliceReply(Bench& bench, const BenchRequest& request) {
+PageReply SliceReply(Bench& bench, const PageRequest& request) {
   SliceOptions options{.at = QueryNumber(request, "at", 0.5),
                        .bone_hu = QueryNumber(request, "bone_hu", kNaN),
                        .skin_hu = QueryNumber(request, "skin_hu", kNaN),
@@ -531,7 +529,7 @@ BenchReply SliceReply(Bench& bench, const BenchRequest& request) {
           {}};
 }
 
-using Handler = BenchReply (*)(Bench&, const BenchRequest&);
+using Handler = PageReply (*)(Bench&, const PageRequest&);
 struct Route {
   std::string_view method, path;
   Handler handle;
@@ -561,7 +559,7 @@ constexpr std::array kRoutes = {
     Route{"POST", "api/upload", &Upload},
 };
 
-BenchReply Find(Bench& bench, const BenchRequest& request) {
+PageReply Find(Bench& bench, const PageRequest& request) {
   for (const Route& route : kRoutes) {
     if (route.path == request.path) {
       return route.method == request.method
@@ -579,7 +577,7 @@ BenchReply Find(Bench& bench, const BenchRequest& request) {
 
 }  // namespace
 
-BenchReply Answer(Bench& bench, const BenchRequest& request) {
+PageReply Answer(Bench& bench, const PageRequest& request) {
   try {
     return Find(bench, request);
   } catch (const Error& error) {

@@ -15,8 +15,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
+#include <utility>
 
-#include "problems/app/workbench/bench_api.h"
 #include "problems/app/workbench/http_connections.h"
 #include "surfaces/base/error.h"
 
@@ -103,14 +103,14 @@ void Refuse(const Refusal& refusal, httplib::Response& response) {
 }  // namespace
 
 struct HttpServer::Impl {
-  Bench& bench;
+  AnswerPage answer;
   HttpServerOptions options;
   HttpConnections connections;
   RequestServer server;
   int port;
 
-  Impl(Bench& the_bench, const HttpServerOptions& the_options)
-      : bench(the_bench),
+  Impl(AnswerPage the_answer, const HttpServerOptions& the_options)
+      : answer(std::move(the_answer)),
         options(the_options),
         connections(options.port, options.limits),
         port(connections.Port()) {}
@@ -186,13 +186,13 @@ struct HttpServer::Impl {
   }
 
   void Reply(const httplib::Request& request, httplib::Response& response) {
-    BenchRequest bench_request{request.method, *BelowToken(request.path), {}, request.body};
+    PageRequest page_request{request.method, *BelowToken(request.path), {}, request.body};
     for (const auto& [key, value] : request.params) {
-      bench_request.query[key] = value;
+      page_request.query[key] = value;
     }
-    const BenchReply reply = Answer(bench, bench_request);
+    const PageReply reply = answer(page_request);
     response.status = reply.status;
-    if (bench_request.path.starts_with("run/")) {
+    if (page_request.path.starts_with("run/")) {
       response.headers.erase("Content-Security-Policy");
       response.set_header("Content-Security-Policy", kReportPolicy);
     }
@@ -236,8 +236,8 @@ struct HttpServer::Impl {
   }
 };
 
-HttpServer::HttpServer(Bench& bench, const HttpServerOptions& options)
-    : impl_(std::make_unique<Impl>(bench, options)) {
+HttpServer::HttpServer(AnswerPage answer, const HttpServerOptions& options)
+    : impl_(std::make_unique<Impl>(std::move(answer), options)) {
   if (impl_->options.token.empty()) {
     impl_->options.token = RandomToken();
   }
@@ -260,7 +260,7 @@ void HttpServer::Serve(const std::stop_token& stop) {
 std::string RandomToken() {
   std::array<unsigned char, 32> bytes{};
   if (::getrandom(bytes.data(), bytes.size(), 0) != static_cast<ssize_t>(bytes.size())) {
-    throw IoError("the system gives no random numbers, which the workbench needs for its address");
+    throw IoError("the system gives no random numbers, which a page needs for its address");
   }
   std::string token;
   for (const unsigned char byte : bytes) {

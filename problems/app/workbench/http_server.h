@@ -8,8 +8,8 @@
 #include <stop_token>
 #include <string>
 
-#include "problems/app/workbench/bench.h"
 #include "problems/app/workbench/http_connections.h"
+#include "problems/app/workbench/page_request.h"
 
 namespace semblance::problems {
 
@@ -23,11 +23,12 @@ struct HttpServerOptions {
 
 // Every request must have the token in its path (compared in constant time), this machine as its
 // Host and, if it has an Origin, this page as its Origin. A POST must have an Origin. The server
-// refuses any other request before it reads the body.
+// refuses any other request before it reads the body. A page below run/ may contain its scripts and
+// gets an origin of its own; all other pages load their scripts from this server.
 class HttpServer {
  public:
   // Starts to listen. Throws IoError if the port is taken.
-  HttpServer(Bench& bench, const HttpServerOptions& options = {});
+  HttpServer(AnswerPage answer, const HttpServerOptions& options = {});
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

@@ -11,21 +11,6 @@
 #include "problems/config/utf8_check.h"
 
 namespace semblance::problems {
-namespace {
-
-// Shortens a text to `most` bytes without cutting a UTF-8 character in half.
-std::string CutTo(const std::string& text, std::size_t most) {
-  if (text.size() <= most) {
-    return text;
-  }
-  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0) == 0x80) {
-    --most;
-  }
-  return text.substr(0, most) + "…";
-}
-
-}  // namespace
-
 std::string EscapeHtml(std::string_view text) {
   std::string html;
   for (const Character& c : SplitCharacters(text)) {
@@ -92,6 +77,16 @@ std::string Dot(double x, double y, double radius, const std::string& title, con
 
 std::string Title(const std::string& text) {
   return text.empty() ? "" : fmt::format("<title>{}</title>", EscapeHtml(text));
+}
+
+std::string CutTo(const std::string& text, std::size_t most) {
+  if (text.size() <= most) {
+    return text;
+  }
+  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0) == 0x80) {
+    --most;
+  }
+  return text.substr(0, most) + "…";
 }
 
 std::string Shortened(const std::string& label) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <string>
 #include <string_view>
 
@@ -34,6 +35,9 @@ std::string Dot(double x, double y, double radius, const std::string& title,
 
 // The text that a browser shows when the pointer rests on the enclosing element. Empty for no text.
 std::string Title(const std::string& text);
+
+// Shortens a text to `most` bytes and an ellipsis, without cutting a UTF-8 character in half.
+std::string CutTo(const std::string& text, std::size_t most);
 
 // Shortens a label so that it fits beside a plot. Each part between commas gets the same room,
 // because labels differ at the heads of their parts.

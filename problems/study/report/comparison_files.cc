@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -36,11 +37,10 @@ ReportTable TreatmentTable(const StudyComparison& comparison) {
 }
 
 ReportTable PairTable(const StudyComparison& comparison) {
-  ReportTable table{
-      "Each treatment of the later studies minus its reference, over the subjects that both have" +
-          comparison.preference.TargetSuffix(),
-      {"treatment", "reference", "subjects", "mean difference", "95 % interval", "worse in",
-       "p, Holm"}};
+  ReportTable table{"Each treatment minus its reference, over the subjects that both have" +
+                        comparison.preference.TargetSuffix(),
+                    {"treatment", "reference", "subjects", "mean difference", "95 % interval",
+                     "worse in", "p, Holm"}};
   for (const TreatmentPair& pair : comparison.pairs) {
     table.AddRow(FullLabel(pair.other), FullLabel(pair.reference), pair.difference.n,
                  pair.difference.mean, IntervalText(pair.difference.mean_95),
@@ -64,6 +64,7 @@ ReportImage MetricBoxes(const StudyComparison& comparison) {
 }
 
 Report MakeReport(const StudyComparison& comparison) {
+  constexpr std::size_t kMostShown = 12;  // pairs; a longer table is folded
   Report report{
       .title = fmt::format("{} compared", fmt::join(comparison.studies, ", ")),
       .subtitle = fmt::format("{}, paired by subject; {}", WordsOfMetric(comparison.metric),
@@ -73,11 +74,12 @@ Report MakeReport(const StudyComparison& comparison) {
   };
   report.sections.push_back(
       {.heading = "Differences",
-       .paragraphs =
-           {"The reference of a treatment is the one of the same name in the first study, else "
-            "the best of the first study. p comes from Wilcoxon's signed-rank test, which needs "
-            "six subjects."},
-       .tables = {PairTable(comparison)}});
+       .paragraphs = {fmt::format(
+           "p comes from Wilcoxon's signed-rank test, which needs six subjects. Holm's correction "
+           "is for the {} of this table.",
+           Counted(std::ssize(comparison.pairs), "pair"))},
+       .tables = {PairTable(comparison)},
+       .folded = comparison.pairs.size() > kMostShown});
   report.sections.push_back({.heading = "Treatments", .tables = {TreatmentTable(comparison)}});
   return report;
 }
@@ -98,14 +100,23 @@ std::string PairText(const TreatmentPair& pair) {
 }  // namespace
 
 std::string ComparisonText(const StudyComparison& comparison) {
+  constexpr std::size_t kMostLines = 20;
   std::string text =
       fmt::format("{} over {}; {}\n", comparison.metric,
                   Counted(std::ssize(comparison.subjects), "subject"), Direction(comparison));
   for (const ComparedTreatment& t : comparison.treatments) {
-    text += fmt::format("  {}: {}\n", FullLabel(t), TableNumber(t.summary.mean));
+    const auto subjects = std::ssize(comparison.subjects);
+    text += fmt::format("  {}: {}{}\n", FullLabel(t), TableNumber(t.summary.mean),
+                        t.summary.n == subjects
+                            ? ""
+                            : fmt::format(" (over {} of {} subjects)", t.summary.n, subjects));
   }
-  for (const TreatmentPair& pair : comparison.pairs) {
-    text += PairText(pair);
+  for (std::size_t n = 0; n < std::min(comparison.pairs.size(), kMostLines); ++n) {
+    text += PairText(comparison.pairs[n]);
+  }
+  if (comparison.pairs.size() > kMostLines) {
+    text += fmt::format("and {} more pairs; --out DIR writes all of them to pairs.csv\n",
+                        comparison.pairs.size() - kMostLines);
   }
   for (const std::string& note : comparison.notes) {
     text += fmt::format("note: {}\n", note);

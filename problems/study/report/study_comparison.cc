@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <set>
@@ -132,6 +133,46 @@ TreatmentPair Pair(const ComparedTreatment& reference, const ComparedTreatment& 
   return pair;
 }
 
+// Each treatment of a later study with one of the first.
+std::vector<TreatmentPair> MatchedPairs(const StudyComparison& comparison) {
+  const auto& treatments = comparison.treatments;
+  const auto is_first = [&](const ComparedTreatment& t) {
+    return t.study == comparison.studies.front();
+  };
+  std::vector<TreatmentPair> pairs;
+  for (const ComparedTreatment& other : treatments) {
+    if (!is_first(other)) {
+      const auto same = std::ranges::find_if(treatments, [&](const ComparedTreatment& t) {
+        return is_first(t) && t.label == other.label;
+      });
+      pairs.push_back(Pair(same == treatments.end() ? treatments.front() : *same, other,
+                           comparison.preference));
+    }
+  }
+  return pairs;
+}
+
+// Every two treatments.
+std::vector<TreatmentPair> AllPairs(const StudyComparison& comparison) {
+  constexpr std::size_t kMostPairs = 5000;
+  const auto& treatments = comparison.treatments;
+  const std::size_t count = treatments.size() * (treatments.size() - 1) / 2;
+  if (count > kMostPairs) {
+    throw InputError(fmt::format(
+        "{} treatments make {} pairs, and at most {} are compared; compare matched pairs alone, or "
+        "studies with fewer treatments",
+        treatments.size(), count, kMostPairs));
+  }
+  std::vector<TreatmentPair> pairs;
+  for (std::size_t a = 0; a < treatments.size(); ++a) {
+    for (std::size_t b = a + 1; b < treatments.size(); ++b) {
+      pairs.push_back(Pair(treatments[a], treatments[b], comparison.preference));
+    }
+  }
+  std::ranges::stable_partition(pairs, &TreatmentPair::same_label);
+  return pairs;
+}
+
 void AdjustTests(std::vector<TreatmentPair>& pairs) {
   std::vector<double> p;
   std::vector<TreatmentPair*> tested;
@@ -180,6 +221,29 @@ std::vector<std::string> ComparisonNotes(std::span<const NamedStudy> studies,
   return notes;
 }
 
+// Notes on means over different subjects, and on a correction that no result can pass.
+std::vector<std::string> PairNotes(const StudyComparison& comparison) {
+  constexpr double kSignificant = 0.05;
+  std::vector<std::string> notes;
+  const auto subjects = std::ssize(comparison.subjects);
+  if (std::ranges::any_of(comparison.treatments,
+                          [&](const ComparedTreatment& t) { return t.summary.n != subjects; })) {
+    notes.emplace_back(
+        "not all treatments have all subjects, so the means are over different subjects; compare "
+        "the differences, which are over the subjects that both have");
+  }
+  const double least = std::pow(2.0, 1.0 - static_cast<double>(subjects)),
+               corrected = least * static_cast<double>(comparison.pairs.size());
+  if (subjects >= kMinComparedSubjects && corrected > kSignificant) {
+    notes.push_back(fmt::format(
+        "{} subjects cannot give a p below {:.2g}, so with Holm's correction for {} pairs the "
+        "smallest possible p is {:.2g}; compare fewer treatments, or matched pairs alone "
+        "(--pairs matched)",
+        subjects, least, comparison.pairs.size(), std::min(1.0, corrected)));
+  }
+  return notes;
+}
+
 }  // namespace
 
 std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders) {
@@ -225,8 +289,10 @@ Better CommonPreference(std::span<const NamedStudy* const> studies, const std::s
 }
 
 StudyComparison CompareStudies(std::span<const NamedStudy> studies, const CompareOptions& options) {
-  if (studies.size() < 2) {
-    throw InputError("one study alone cannot be compared; give two folders or more");
+  const bool is_matched = options.pairs == ComparedPairs::kMatched;
+  if (studies.empty() || (is_matched && studies.size() < 2)) {
+    throw InputError(
+        "one study alone has no matched pairs; give two folders or more, or compare all pairs");
   }
   const std::string metric =
       options.metric.empty() ? studies.front().results.metric : options.metric;
@@ -243,20 +309,16 @@ StudyComparison CompareStudies(std::span<const NamedStudy> studies, const Compar
                              .pairs = {},
                              .notes = {}};
   comparison.subjects = CommonSubjects(studies, metric);
-  const std::vector<ComparedTreatment> first = ComparedTreatments(studies.front(), comparison);
   for (const NamedStudy& study : studies) {
     comparison.studies.push_back(study.name);
-    for (ComparedTreatment& treatment : ComparedTreatments(study, comparison)) {
-      if (&study != &studies.front()) {
-        const auto same = std::ranges::find(first, treatment.label, &ComparedTreatment::label);
-        comparison.pairs.push_back(
-            Pair(same == first.end() ? first.front() : *same, treatment, comparison.preference));
-      }
-      comparison.treatments.push_back(std::move(treatment));
-    }
+    std::ranges::move(ComparedTreatments(study, comparison),
+                      std::back_inserter(comparison.treatments));
   }
+  comparison.pairs = is_matched ? MatchedPairs(comparison) : AllPairs(comparison);
   AdjustTests(comparison.pairs);
-  comparison.notes = ComparisonNotes(studies, metric, comparison.subjects);
+  comparison.notes = PairNotes(comparison);
+  std::ranges::move(ComparisonNotes(studies, metric, comparison.subjects),
+                    std::back_inserter(comparison.notes));
   return comparison;
 }
 

@@ -33,10 +33,10 @@ struct ComparedTreatment {
   SampleSummary summary;                     // of the metric
 };
 
-// A treatment of a later study against one of the first.
+// Two treatments over the subjects that both have.
 struct TreatmentPair {
   ComparedTreatment reference, other;
-  bool same_label = false;    // false: the reference is the best of the first study
+  bool same_label = false;    // the treatments have the same label
   int better = 0, worse = 0;  // subjects for which `other` is better or worse
   SampleSummary difference;   // other minus reference (Preference::Compared), over common subjects
   WilcoxonResult test;        // of the differences; none below 6 subjects
@@ -49,23 +49,29 @@ struct StudyComparison {
   std::vector<std::string> studies;
   std::vector<std::string> subjects;          // that all studies have, sorted
   std::vector<ComparedTreatment> treatments;  // study by study, best mean first
-  std::vector<TreatmentPair> pairs;           // in the order of the later studies' treatments
+  std::vector<TreatmentPair> pairs;           // those of the same label first
   std::vector<std::string> notes;             // left-out subjects and trials
 };
+
+// The treatments that are paired. kAll: every two of them, the earlier one as the reference. kMatched:
+// each treatment of a later study with the one of the same label in the first study, else with the
+// best of the first study. Fewer pairs make Holm's correction milder.
+enum class ComparedPairs { kAll, kMatched };
 
 struct CompareOptions {
   std::string metric;            // a path in result.json; empty: the first study's metric
   std::optional<Better> better;  // none: CommonPreference
+  ComparedPairs pairs = ComparedPairs::kAll;
 };
 
 // The direction in which the studies that use this metric rank it. DefaultBetter if no study uses
 // it. Throws InputError if the studies contradict each other.
 Better CommonPreference(std::span<const NamedStudy* const> studies, const std::string& metric);
 
-// Pairs each treatment of a later study with the one of the same label in the first study, else
-// with the best of the first study. The unit is the subject, identified by its name. Throws
-// InputError for fewer than two studies, if no subject is in all of them, if a study has no number
-// of that name, or if the studies contradict each other and `better` is empty.
+// Pairs the treatments of one study or more. The unit is the subject, identified by its name.
+// Throws InputError without a study, for one study with kMatched, if no subject is in all studies,
+// if a study has no number of that name, if there are more than 5,000 pairs, or if the studies
+// contradict each other and `better` is empty.
 StudyComparison CompareStudies(std::span<const NamedStudy> studies, const CompareOptions& options);
 
 // ---------------------------------------------------------------------------------------------

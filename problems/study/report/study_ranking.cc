@@ -6,6 +6,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
+#include <map>
+#include <numeric>
+#include <set>
 
 #include "problems/report/plain_names.h"
 #include "surfaces/base/geometry.h"
@@ -21,20 +25,126 @@ double MeanOverSubjects(const Treatment& treatment) {
   return treatment.by_subject.empty() ? kNaN : sum / count;
 }
 
+namespace {
+
+// Finds the treatments that have enough subjects to take part in the comparison.
+std::vector<bool> FindParts(const std::vector<Treatment>& treatments) {
+  std::size_t most = 0;
+  for (const Treatment& treatment : treatments) {
+    most = std::max(most, treatment.by_subject.size());
+  }
+  std::vector<bool> parts;
+  for (const Treatment& treatment : treatments) {
+    const std::size_t count = treatment.by_subject.size();
+    parts.push_back(count > 0 && 2 * count >= most);
+  }
+  return parts;
+}
+
+std::set<std::string> FindCommonSubjects(const std::vector<Treatment>& treatments) {
+  const std::vector<bool> parts = FindParts(treatments);
+  std::map<std::string, std::ptrdiff_t> count;
+  for (std::size_t n = 0; n < treatments.size(); ++n) {
+    if (parts[n]) {
+      for (const auto& [subject, value] : treatments[n].by_subject) {
+        ++count[subject];
+      }
+    }
+  }
+  std::set<std::string> common;
+  for (const auto& [subject, treatments_with_it] : count) {
+    if (treatments_with_it == std::ranges::count(parts, true)) {
+      common.insert(subject);
+    }
+  }
+  return common;
+}
+
+// "a, b, c and 4 more".
+std::string ListNames(const std::vector<std::string>& names) {
+  constexpr std::size_t kNamed = 5;
+  const std::vector<std::string> first(
+      names.begin(), names.begin() + static_cast<long>(std::min(names.size(), kNamed)));
+  return fmt::format(
+      "{}{}", fmt::join(first, ", "),
+      names.size() > kNamed ? fmt::format(" and {} more", names.size() - kNamed) : std::string());
+}
+
+}  // namespace
+
+std::vector<Treatment> RestrictToCommonSubjects(const StudyResults& results,
+                                                std::vector<Treatment> treatments) {
+  const std::set<std::string> common = FindCommonSubjects(treatments);
+  if (common.empty()) {
+    return treatments;
+  }
+  const std::vector<bool> parts = FindParts(treatments);
+  for (std::size_t n = 0; n < treatments.size(); ++n) {
+    const auto is_out = [&](const std::string& subject) {
+      return !parts[n] || !common.contains(subject);
+    };
+    std::erase_if(treatments[n].by_subject, [&](const auto& one) { return is_out(one.first); });
+    std::erase_if(treatments[n].trials,
+                  [&](std::size_t trial) { return is_out(results.trials[trial].subject); });
+  }
+  return treatments;
+}
+
+std::string CommonSubjectsText(const std::vector<Treatment>& treatments) {
+  const std::set<std::string> common = FindCommonSubjects(treatments);
+  const std::vector<bool> parts = FindParts(treatments);
+  std::set<std::string> all;
+  std::vector<std::string> sparse;
+  for (std::size_t n = 0; n < treatments.size(); ++n) {
+    for (const auto& [subject, value] : treatments[n].by_subject) {
+      all.insert(subject);
+    }
+    if (!parts[n] && !treatments[n].by_subject.empty()) {
+      sparse.push_back(treatments[n].label);
+    }
+  }
+  if (common.empty()) {
+    return all.empty() ? ""
+                       : "No subject has a value for all treatments, so each mean is over other "
+                         "subjects. The order of the treatments is not a comparison. Run the "
+                         "missing trials.";
+  }
+  std::vector<std::string> left_out;
+  std::ranges::set_difference(all, common, std::back_inserter(left_out));
+  std::string text;
+  if (!left_out.empty()) {
+    text = fmt::format(
+        "The treatments are compared over the {} that all of them have. Not all of them have: {}.",
+        Counted(std::ssize(common), "subject"), ListNames(left_out));
+  }
+  if (!sparse.empty()) {
+    text += fmt::format("{}Not ranked, because fewer than half of the subjects have a value: {}.",
+                        text.empty() ? "" : " ", ListNames(sparse));
+  }
+  return text;
+}
+
 std::vector<Treatment> RankTreatments(const StudyResults& results) {
-  std::vector<Treatment> treatments = Treatments(results, results.metric);
-  const auto cost = [&](const Treatment& treatment) {
+  const std::vector<Treatment> treatments = Treatments(results, results.metric);
+  const std::vector<Treatment> compared = RestrictToCommonSubjects(results, treatments);
+  std::vector<double> cost;
+  for (const Treatment& treatment : compared) {
     double sum = 0;
     for (const auto& [subject, value] : treatment.by_subject) {
       sum += results.preference.RankingCost(value);
     }
-    return sum / static_cast<double>(treatment.by_subject.size());  // NaN without one
-  };
-  std::ranges::stable_sort(treatments, [&](const Treatment& a, const Treatment& b) {
-    const double x = cost(a), y = cost(b);
-    return std::isfinite(x) && (!std::isfinite(y) || x < y);
+    cost.push_back(sum / static_cast<double>(treatment.by_subject.size()));  // NaN without one
+  }
+  std::vector<std::size_t> order(treatments.size());
+  std::iota(order.begin(), order.end(), 0);
+  std::ranges::stable_sort(order, [&](std::size_t a, std::size_t b) {
+    return std::isfinite(cost[a]) && (!std::isfinite(cost[b]) || cost[a] < cost[b]);
   });
-  return treatments;
+  std::vector<Treatment> ranked;
+  for (const std::size_t n : order) {
+    ranked.push_back(treatments[n]);
+  }
+  return ranked;
 }
 
 std::string RankingOrderText(const Preference& preference) {
@@ -65,7 +175,8 @@ std::string LabelPartsText(const StudyResults& results) {
 
 std::string RankingText(const StudyResults& results) {
   constexpr std::size_t kLines = 20;
-  std::vector<Treatment> ranked = RankTreatments(results);
+  const std::vector<Treatment> all = RankTreatments(results);
+  std::vector<Treatment> ranked = RestrictToCommonSubjects(results, all);
   std::erase_if(ranked, [](const Treatment& t) { return t.by_subject.empty(); });
   if (ranked.empty()) {
     return {};
@@ -84,7 +195,8 @@ std::string RankingText(const StudyResults& results) {
   if (ranked.size() > kLines) {
     text += fmt::format("      and {} more in summary.csv\n", ranked.size() - kLines);
   }
-  return text;
+  const std::string common = CommonSubjectsText(all);
+  return text + (common.empty() ? "" : common + "\n");
 }
 
 }  // namespace semblance::problems

@@ -12,8 +12,19 @@ namespace semblance::problems {
 // The metric's mean over subjects. NaN without subjects.
 double MeanOverSubjects(const Treatment& treatment);
 
-// The treatments by the mean cost (Preference) of the study's metric, best first. Treatments
-// without values come last.
+// The treatments over their common subjects, in the same order: subjects and trials that not all of
+// them have are left out, so that no treatment looks better because of its subjects. A treatment
+// with fewer than half of the subjects of the fullest one is left empty instead, because it would
+// take most subjects from all others. Without a common subject the treatments stay as they are.
+std::vector<Treatment> RestrictToCommonSubjects(const StudyResults& results,
+                                                std::vector<Treatment> treatments);
+
+// A sentence on the subjects and treatments that RestrictToCommonSubjects leaves out, or a warning
+// that there are no common subjects. Empty if all treatments have the same subjects.
+std::string CommonSubjectsText(const std::vector<Treatment>& treatments);
+
+// The treatments, with all their subjects, by the mean cost (Preference) of the study's metric over
+// the common subjects, best first. Treatments without a place in that comparison come last.
 std::vector<Treatment> RankTreatments(const StudyResults& results);
 
 // The mean wall time of the treatment's trials that have one. NaN if none has. It does not contain
@@ -27,8 +38,9 @@ std::string RankingOrderText(const Preference& preference);
 // Empty if the study names its treatments itself or has only one.
 std::string LabelPartsText(const StudyResults& results);
 
-// One line per treatment for a terminal: rank, mean, subjects, seconds and label. Lists the first
-// twenty and counts the others. Empty if no trial has a value.
+// One line per treatment for a terminal: rank, mean over the common subjects, their number, seconds
+// and label. Lists the first twenty and counts the others. Ends with CommonSubjectsText. Empty if
+// no trial has a value.
 std::string RankingText(const StudyResults& results);
 
 }  // namespace semblance::problems

@@ -15,7 +15,9 @@
 #include "problems/report/report_kit.h"
 #include "problems/report/scene_json.h"
 #include "problems/study/depth_study.h"
+#include "problems/study/report/factor_section.h"
 #include "problems/study/report/results_sqlite.h"
+#include "problems/study/report/study_factors.h"
 #include "problems/study/report/study_ranking.h"
 #include "problems/study/report/study_sections.h"
 #include "problems/study/trial_folder.h"
@@ -41,8 +43,9 @@ ReportTable RankingTable(const StudyResults& results, const std::vector<Treatmen
                                 RankingOrderText(results.preference), LabelPartsText(results)),
                     {"treatment", "rank", "subjects", "not usable", "mean", "mean, 95 % interval",
                      "sd", "median", "min", "max", "mean seconds"}};
+  const std::vector<Treatment> compared = RestrictToCommonSubjects(results, ranked);
   for (const Treatment& treatment : ranked) {
-    const SampleSummary s = Summarize(CollectValues(treatment));
+    const SampleSummary s = Summarize(CollectValues(compared[table.rows.size()]));
     table.AddRow(treatment.label, s.n > 0 ? std::to_string(table.rows.size() + 1) : "", s.n,
                  treatment.unusable, s.mean, IntervalText(s.mean_95), s.sd, s.median, s.min, s.max,
                  TableNumber(MeanSeconds(results, treatment), 1));
@@ -64,7 +67,8 @@ std::vector<double> Differences(const Treatment& treatment, const Treatment& bes
 }
 
 ReportTable PairsTable(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  ReportTable table{fmt::format("Each treatment minus the best ({}), paired by subject{}",
+  ReportTable table{fmt::format("Each treatment minus the best ({}), over the subjects that "
+                                "both have{}",
                                 ranked[0].label, results.preference.TargetSuffix()),
                     {"treatment", "pairs", "mean difference", "95 % interval", "worse in",
                      "Wilcoxon p", "p, Holm"}};
@@ -189,10 +193,9 @@ std::vector<BoxRow> MeanCurves(const StudyResults& results, const std::vector<Tr
   for (const Treatment& treatment : ranked) {
     BoxRow mean{treatment.label, {}};
     int count = 0;
-    for (const TrialRow& row : results.trials) {
-      const std::vector<double>& values = row.*curve;
-      if (row.values == treatment.values && row.status == "done" &&
-          (count == 0 || values.size() == mean.values.size())) {
+    for (const std::size_t trial : treatment.trials) {
+      const std::vector<double>& values = results.trials[trial].*curve;
+      if (count == 0 || values.size() == mean.values.size()) {
         mean.values.resize(values.size(), 0);
         for (std::size_t k = 0; k < values.size(); ++k) {
           mean.values[k] += values[k];
@@ -362,16 +365,30 @@ std::vector<ReportTile> Tiles(const StudyResults& results, const std::vector<Tre
   return tiles;
 }
 
-ReportSection TreatmentsSection(const StudyResults& results, const std::vector<Treatment>& ranked) {
-  ReportSection section{.heading = "Treatments"};
+// Long tables are folded, because each of their rows is a card on a phone.
+ReportSection TreatmentsSection(const StudyResults& results, const std::vector<Treatment>& ranked,
+                                const std::vector<Treatment>& compared) {
+  constexpr std::size_t kMostShown = 6;
+  ReportSection section{.heading = "Treatments", .folded = ranked.size() > kMostShown};
   section.tables = {RankingTable(results, ranked)};
   if (ranked.size() > 1) {
     section.tables.push_back(PairsTable(results, ranked));
-    section.images = {{CumulativePlotSvg(Boxes(ranked), WordsOfMetric(results.metric)),
+    section.images = {{CumulativePlotSvg(Boxes(compared), WordsOfMetric(results.metric)),
                        "Share of subjects below each value.",
                        "cumulative distribution of the metric, one line per treatment"}};
   }
   return section;
+}
+
+// The sections on the axes. If the treatments are no grid, the numeric axes are drawn as they are.
+std::vector<ReportSection> AxisSections(const StudyResults& results,
+                                        const std::vector<Treatment>& compared) {
+  const FactorGrid grid = FindFactorGrid(results);
+  std::vector<ReportSection> sections = FactorSections(results, grid);
+  if (grid.subjects.empty()) {
+    sections.push_back({.heading = "Along each axis", .images = AxisPlots(results, compared)});
+  }
+  return sections;
 }
 
 // The sections about the metric. Empty sections are left out.
@@ -383,16 +400,17 @@ std::vector<ReportSection> MetricSections(const StudyResults& results,
         {.heading = "No value",
          .paragraphs = {fmt::format("No finished trial has a value of '{}'.", results.metric)}}};
   }
-  std::vector<ReportSection> sections = {TreatmentsSection(results, ranked)};
+  const std::vector<Treatment> compared = RestrictToCommonSubjects(results, ranked);
+  std::vector<ReportSection> sections = AxisSections(results, compared);
+  sections.push_back(TreatmentsSection(results, ranked, compared));
   if (ranked.size() > 1) {
-    sections.push_back(RankSection(results, ranked));
+    sections.push_back(RankSection(results, compared));
   }
-  sections.push_back({.heading = "Along each axis", .images = AxisPlots(results, ranked)});
   sections.push_back({.heading = "Subject by subject", .images = SubjectMap(results, ranked)});
-  std::ranges::move(IdentifySections(results, ranked), std::back_inserter(sections));
+  std::ranges::move(IdentifySections(results, compared), std::back_inserter(sections));
   sections.push_back(
-      {.heading = "Further tables", .tables = Subtables(results, ranked), .folded = true});
-  sections.push_back(CurvesSection(results, ranked));
+      {.heading = "Further tables", .tables = Subtables(results, compared), .folded = true});
+  sections.push_back(CurvesSection(results, compared));
   sections.push_back({.heading = "Depth maps", .images = maps, .folded = true});
   std::erase_if(sections, [](const ReportSection& section) {
     return section.paragraphs.empty() && section.images.empty() && section.tables.empty();
@@ -401,7 +419,8 @@ std::vector<ReportSection> MetricSections(const StudyResults& results,
 }
 
 // Failed and missing trials come before other notes.
-std::vector<std::string> StudyNotes(const StudyResults& results) {
+std::vector<std::string> StudyNotes(const StudyResults& results,
+                                    const std::vector<Treatment>& ranked) {
   std::vector<std::string> notes;
   const int failed = results.Count("failed"), missing = results.Count("missing");
   if (failed > 0) {
@@ -418,33 +437,37 @@ std::vector<std::string> StudyNotes(const StudyResults& results) {
     notes.push_back(fmt::format("{} not run yet, so the results may still change.",
                                 Counted(missing, "trial is", "trials are")));
   }
+  if (const std::string common = CommonSubjectsText(ranked); !common.empty()) {
+    notes.push_back(common);
+  }
   notes.insert(notes.end(), results.notes.begin(), results.notes.end());
   return notes;
 }
 
-std::string StudyPage(const StudyResults& results, const std::filesystem::path& root) {
+}  // namespace
+
+std::string StudyReportHtml(const StudyResults& results, const std::filesystem::path& folder) {
   const std::vector<Treatment> ranked = RankTreatments(results);
-  const SceneCollection scenes = Scenes(results, ranked, root);
-  const std::vector<ReportImage> maps = DepthMaps(results, ranked, root);
+  const SceneCollection scenes = Scenes(results, ranked, folder);
+  const std::vector<ReportImage> maps = DepthMaps(results, ranked, folder);
   Report report;
   report.title = results.title;
   report.subtitle = fmt::format(
       "Study {} over {}", results.hash,
       results.axes.empty() ? "subjects alone" : fmt::format("{}", fmt::join(results.axes, ", ")));
-  report.tiles = Tiles(results, ranked);
+  const std::vector<Treatment> compared = RestrictToCommonSubjects(results, ranked);
+  report.tiles = Tiles(results, compared);
   if (!ranked.empty() && !ranked[0].by_subject.empty()) {
-    report.main_images = {SubjectBoxPlot(Boxes(ranked), WordsOfMetric(results.metric),
+    report.main_images = {SubjectBoxPlot(Boxes(compared), WordsOfMetric(results.metric),
                                          "box plot of the metric, one row per treatment")};
   }
   report.sections = MetricSections(results, ranked, maps);
   report.scenes = scenes.json;
   report.scenes_note = SceneNote(results, scenes);
-  report.notes = StudyNotes(results);
-  report.sections.push_back(TrialsSection(results, root));
+  report.notes = StudyNotes(results, ranked);
+  report.sections.push_back(TrialsSection(results, folder));
   return ReportHtml(report);
 }
-
-}  // namespace
 
 StudyResults WriteStudyTables(OutputFolder& folder) {
   StudyResults results = ReadStudyResults(folder.Root(), TrialCheck::kShown);
@@ -455,9 +478,10 @@ StudyResults WriteStudyTables(OutputFolder& folder) {
   };
   std::array tables = {
       Table{"trials.csv", [&] { return TrialsCsv(results); }},
+      Table{"trials_wide.csv", [&] { return TrialsWideCsv(results); }},
       Table{"summary.csv", [&] { return SummaryCsv(results); }},
       Table{"results.sqlite", [&] { return ResultsSqlite(results); }},
-      Table{"report.html", [&] { return StudyPage(results, folder.Root()); }},
+      Table{"report.html", [&] { return StudyReportHtml(results, folder.Root()); }},
   };
   ParallelFor(tables.size(), static_cast<int>(tables.size()), 1,
               [&](std::size_t n) { tables[n].text = tables[n].text_of(); });

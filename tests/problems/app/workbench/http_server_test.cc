@@ -21,6 +21,7 @@
 #include <utility>
 #include <vector>
 
+#include "problems/app/workbench/bench_api.h"
 #include "problems/subject/phantom.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
@@ -92,7 +93,7 @@ double UsedMemory_mb() {
 // A workbench on a coarse phantom.
 class WorkbenchServer : public ::testing::Test {
  protected:
-  WorkbenchServer() : bench_(Options(folder_)), server_(bench_, Listening()) {
+  WorkbenchServer() : bench_(Options(folder_)), server_(Answering(), Listening()) {
     serving_ = std::jthread([this](const std::stop_token& stop) { server_.Serve(stop); });
   }
 
@@ -104,6 +105,10 @@ class WorkbenchServer : public ::testing::Test {
                         fmt::format("base: {}/configs/phantom.yaml\nsubject: {{rings: 20}}\n",
                                     SEMBLANCE_SOURCE_DIR));
     return options;
+  }
+
+  AnswerPage Answering() {
+    return [this](const PageRequest& request) { return Answer(bench_, request); };
   }
 
   static HttpServerOptions Listening() {
@@ -317,7 +322,7 @@ TEST_F(WorkbenchServer, ASecondWorkbenchOnTheFolderIsRefused) {
 
 TEST_F(WorkbenchServer, AStopDuringTheStartEndsTheServer) {
   for (int k = 0; k < 40; ++k) {
-    HttpServer server(bench_, Listening());
+    HttpServer server(Answering(), Listening());
     const std::jthread serving([&](const std::stop_token& stop) { server.Serve(stop); });
     std::this_thread::sleep_for(std::chrono::microseconds(10 * k));
   }  // each thread is stopped and joined here

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/study/report/study_comparison.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <fmt/format.h>
+#include <algorithm>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -27,6 +29,7 @@ using ::testing::SizeIs;
 using testing::WordsOf;
 
 constexpr const char* kMetric = "face.rms_mm";
+const CompareOptions kMatched{.metric = "", .better = {}, .pairs = ComparedPairs::kMatched};
 
 // A study of the given treatments over subjects s0, s1, ...
 NamedStudy Study(const std::string& name, const std::vector<std::string>& treatments, int subjects,
@@ -60,7 +63,7 @@ double Value(const NamedStudy& study, const std::string& treatment, const std::s
 
 TEST(StudyComparison, TheDifferenceIsAMeanOverCommonSubjects) {
   const NamedStudy a = Study("a", {"x", "y"}, 9, 1), b = Study("b", {"x"}, 7, 2);
-  const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, kMatched);
   EXPECT_THAT(comparison.subjects, SizeIs(7));
   ASSERT_THAT(comparison.pairs, SizeIs(1));
   const TreatmentPair& pair = comparison.pairs[0];
@@ -96,12 +99,12 @@ TEST(StudyComparison, ACopyDoesNotDifferAndSwappingTurnsTheSign) {
   const NamedStudy a = Study("a", {"x", "y"}, 8, 1), b = Study("b", {"x", "y"}, 8, 2);
   NamedStudy copy = a;
   copy.name = "copy";
-  for (const TreatmentPair& pair : CompareStudies(std::vector{a, copy}, {}).pairs) {
+  for (const TreatmentPair& pair : CompareStudies(std::vector{a, copy}, kMatched).pairs) {
     EXPECT_EQ(pair.difference.mean, 0);
     EXPECT_EQ(pair.better + pair.worse, 0);
   }
-  const auto there = CompareStudies(std::vector{a, b}, {}).pairs,
-             back = CompareStudies(std::vector{b, a}, {}).pairs;
+  const auto there = CompareStudies(std::vector{a, b}, kMatched).pairs,
+             back = CompareStudies(std::vector{b, a}, kMatched).pairs;
   for (const TreatmentPair& pair : there) {
     for (const TreatmentPair& other : back) {
       if (other.other.label == pair.other.label) {
@@ -112,9 +115,65 @@ TEST(StudyComparison, ACopyDoesNotDifferAndSwappingTurnsTheSign) {
   }
 }
 
+// Three treatments of one study and one of another make six pairs, each once, and Holm's correction
+// is for all of them.
+TEST(StudyComparison, AllPairsAreComparedOnce) {
+  const NamedStudy a = Study("a", {"x", "y", "z"}, 8, 1), b = Study("b", {"y"}, 8, 2);
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
+  ASSERT_THAT(comparison.pairs, SizeIs(6));
+  EXPECT_TRUE(comparison.pairs[0].same_label) << "the same label comes first";
+  std::set<std::string> pairs;
+  std::vector<double> p;
+  for (const TreatmentPair& pair : comparison.pairs) {
+    const std::string one = pair.reference.study + pair.reference.label,
+                      other = pair.other.study + pair.other.label;
+    pairs.insert(std::min(one, other) + std::max(one, other));
+    EXPECT_NEAR(pair.difference.mean, pair.other.summary.mean - pair.reference.summary.mean, 1e-12);
+    p.push_back(pair.test.p);
+  }
+  EXPECT_THAT(pairs, ElementsAre("axay", "axaz", "axby", "ayaz", "ayby", "azby"));
+  const std::vector<double> adjusted = Holm(p);
+  for (std::size_t k = 0; k < p.size(); ++k) {
+    EXPECT_DOUBLE_EQ(comparison.pairs[k].p_holm, adjusted[k]);
+  }
+  EXPECT_THAT(CompareStudies(std::vector{a}, {}).pairs, SizeIs(3)) << "one study suffices";
+}
+
+TEST(StudyComparison, MeansOverDifferentSubjectsAreReported) {
+  const NamedStudy a = Study("a", {"x"}, 8, 1);
+  NamedStudy b = Study("b", {"x", "y"}, 8, 2);
+  EXPECT_THAT(CompareStudies(std::vector{a, b}, {}).notes,
+              Not(Contains(HasSubstr("different subjects"))));
+  b.results.trials[3].status = "failed";  // y of s1
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
+  EXPECT_THAT(comparison.notes, Contains(HasSubstr("the means are over different subjects")));
+  EXPECT_THAT(ComparisonText(comparison), HasSubstr("(over 7 of 8 subjects)"));
+}
+
+// Eight subjects give 1/128 at best: enough for 6 pairs, not for 10.
+TEST(StudyComparison, ACorrectionThatNoResultCanPassIsReported) {
+  const auto notes = [](const std::vector<std::string>& treatments) {
+    return CompareStudies(std::vector{Study("a", treatments, 8, 1)}, {}).notes;
+  };
+  EXPECT_THAT(notes({"x", "y", "z", "w"}), Not(Contains(HasSubstr("smallest possible"))));
+  EXPECT_THAT(
+      notes({"x", "y", "z", "w", "v"}),
+      Contains(AllOf(HasSubstr("below 0.0078"), HasSubstr("smallest possible p is 0.078"))));
+}
+
+TEST(StudyComparison, TooManyPairsAreRefused) {
+  std::vector<std::string> labels;
+  for (int k = 0; k < 101; ++k) {
+    labels.push_back(fmt::format("t{}", k));
+  }
+  const NamedStudy a = Study("a", labels, 1, 1);
+  EXPECT_THAT(WordsOf<InputError>([&] { CompareStudies(std::vector{a}, {}); }),
+              HasSubstr("101 treatments make 5050 pairs"));
+}
+
 TEST(StudyComparison, AnUnknownLabelIsComparedWithTheBestOfTheFirst) {
   const NamedStudy a = Study("a", {"x", "y", "z"}, 8, 1), b = Study("b", {"other"}, 8, 2);
-  const StudyComparison comparison = CompareStudies(std::vector{a, b}, {});
+  const StudyComparison comparison = CompareStudies(std::vector{a, b}, kMatched);
   ASSERT_THAT(comparison.pairs, SizeIs(1));
   EXPECT_FALSE(comparison.pairs[0].same_label);
   for (const ComparedTreatment& treatment : comparison.treatments) {
@@ -147,7 +206,9 @@ TEST(StudyComparison, BelowSixSubjectsThereIsNoTest) {
 TEST(StudyComparison, IncomparableStudiesAreRefused) {
   const NamedStudy a = Study("a", {"x"}, 3, 1);
   NamedStudy b = Study("b", {"x"}, 3, 2);
-  EXPECT_THAT(WordsOf<InputError>([&] { CompareStudies(std::vector{a}, {}); }),
+  EXPECT_THAT(WordsOf<InputError>([&] { CompareStudies(std::vector{a}, kMatched); }),
+              HasSubstr("one study alone"));
+  EXPECT_THAT(WordsOf<InputError>([&] { CompareStudies(std::vector<NamedStudy>(), {}); }),
               HasSubstr("one study alone"));
   EXPECT_THAT(WordsOf<InputError>([&] {
                 CompareStudies(std::vector{a, b}, {.metric = "face.nothing", .better = {}});
@@ -176,7 +237,8 @@ TEST(StudyComparison, HigherIsBetterReversesTheOrder) {
     }
   }
   const auto by = [&](const char* metric) {
-    return CompareStudies(std::vector{a, b}, {.metric = metric, .better = {}});
+    return CompareStudies(std::vector{a, b},
+                          {.metric = metric, .better = {}, .pairs = ComparedPairs::kMatched});
   };
   const StudyComparison share = by(kShare), negative = by("negative");
   EXPECT_EQ(share.preference.better, Better::kHigher);
@@ -209,7 +271,8 @@ TEST(StudyComparison, SignedErrorsAndCoverageAreBestNearestToTheirTarget) {
     }
   }
   const auto by = [&](const char* metric) {
-    return CompareStudies(std::vector{a, b}, {.metric = metric, .better = {}});
+    return CompareStudies(std::vector{a, b},
+                          {.metric = metric, .better = {}, .pairs = ComparedPairs::kMatched});
   };
   const StudyComparison share = by("depth_truth.closest.coverage_90"),
                         error = by("depth_truth.closest.mean_signed_mm");
@@ -265,7 +328,7 @@ TEST(ComparisonFiles, TheTablesHoldEveryPairAndValue) {
   const StudyComparison comparison =
       CompareStudies(std::vector{Study("a", {"x", "y"}, 8, 1), Study("b", {"x", "y"}, 8, 2)}, {});
   const std::string pairs = PairsCsv(comparison), values = ComparedCsv(comparison);
-  EXPECT_EQ(std::count(pairs.begin(), pairs.end(), '\n'), 1 + 2);
+  EXPECT_EQ(std::count(pairs.begin(), pairs.end(), '\n'), 1 + 6);
   EXPECT_EQ(std::count(values.begin(), values.end(), '\n'), 1 + 2 * 2 * 8);
   const testing::ScratchFolder folder;
   OutputFolder output(folder / "out", WhenNotEmpty::kRefuse);
