@@ -390,6 +390,23 @@ std::set<std::string> FindCommon(const std::vector<std::map<std::string, double>
   return common;
 }
 
+// Bootstraps take most of the time of the tables, so that threads share them.
+std::vector<SampleSummary> SummarizeEach(
+    const std::vector<std::map<std::string, double>>& by_subject) {
+  constexpr std::size_t kBlock = 8;  // summaries per task
+  std::vector<SampleSummary> summaries(by_subject.size());
+  ParallelFor(by_subject.size(),
+              static_cast<int>(std::max(1U, std::thread::hardware_concurrency())), kBlock,
+              [&](std::size_t n) {
+                std::vector<double> values;
+                for (const auto& [subject, value] : by_subject[n]) {
+                  values.push_back(value);
+                }
+                summaries[n] = Summarize(values);
+              });
+  return summaries;
+}
+
 double MeanOver(const std::map<std::string, double>& values,
                 const std::set<std::string>& subjects) {
   double sum = 0;
@@ -416,12 +433,9 @@ std::string SummaryCsv(const StudyResults& results) {
       by_subject.push_back(walk.Next(treatment, metric));
     }
     const std::set<std::string> common = FindCommon(by_subject);
+    const std::vector<SampleSummary> summaries = SummarizeEach(by_subject);
     for (std::size_t n = 0; n < treatments.size(); ++n) {
-      std::vector<double> values;
-      for (const auto& [subject, value] : by_subject[n]) {
-        values.push_back(value);
-      }
-      const SampleSummary s = Summarize(values);
+      const SampleSummary& s = summaries[n];
       csv.Row(treatments[n].values, metric, s.n, s.mean, s.sd, s.median, s.min, s.max,
               s.mean_95.low, s.mean_95.high, treatments[n].unusable, common.size(),
               MeanOver(by_subject[n], common));

@@ -10,7 +10,7 @@
 
   const showReport = async () => {
     const reply = await fetch('run/report.html');
-    if (!reply.ok) { return; }  // no trial has been planned yet
+    if (!reply.ok) { return; }
     const html = await reply.text();  // its style and scripts, which this page must not load, are outside of main
     const page = document.createElement('main');
     page.innerHTML = html.slice(html.indexOf('<main>') + 6, html.lastIndexOf('</main>'));
@@ -35,7 +35,8 @@
     try {
       const state = await (await fetch('api/state')).json();
       showState(state);
-      if (state.over || (state.finished !== reported && performance.now() > next)) {
+      const has_plan = state.trials > 0;  // before, there is nothing to report
+      if (has_plan && (state.over || (state.finished !== reported && performance.now() > next))) {
         const begin = performance.now();
         await showReport();
         reported = state.finished;

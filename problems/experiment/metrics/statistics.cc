@@ -8,6 +8,7 @@
 #include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
+#include <cstdint>
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/quantile.h"
@@ -18,16 +19,42 @@ namespace {
 
 double Rounded(double x) { return std::round(x * 1e9) / 1e9; }
 
-Interval BootstrapMean(std::span<const double> values, std::uint64_t random_seed) {
-  constexpr int kResamples = 4000;
+constexpr std::size_t kResamples = 4000;
+
+std::vector<std::uint32_t> DrawResamples(std::size_t size, std::uint64_t random_seed) {
   Random random(random_seed);
+  std::vector<std::uint32_t> indices(kResamples * size);
+  for (std::uint32_t& index : indices) {
+    index = static_cast<std::uint32_t>(random.Index(size));
+  }
+  return indices;
+}
+
+// The indices of all resamples of a sample of this size. Drawing them takes most of the time of a
+// bootstrap, and a study has many thousand samples of one size, so that each thread keeps the last
+// ones.
+const std::vector<std::uint32_t>& ResampleIndices(std::size_t size, std::uint64_t random_seed) {
+  struct Drawn {
+    std::size_t size = 0;
+    std::uint64_t random_seed = 0;
+    std::vector<std::uint32_t> indices;
+  };
+  static thread_local Drawn last;
+  if (last.size != size || last.random_seed != random_seed) {
+    last = {size, random_seed, DrawResamples(size, random_seed)};
+  }
+  return last.indices;
+}
+
+Interval BootstrapMean(std::span<const double> values, std::uint64_t random_seed) {
+  const std::vector<std::uint32_t>& indices = ResampleIndices(values.size(), random_seed);
   std::vector<double> means(kResamples);
-  for (double& mean : means) {
+  for (std::size_t k = 0; k < kResamples; ++k) {
     double sum = 0;
     for (std::size_t n = 0; n < values.size(); ++n) {
-      sum += values[random.Index(values.size())];
+      sum += values[indices[k * values.size() + n]];
     }
-    mean = sum / static_cast<double>(values.size());
+    means[k] = sum / static_cast<double>(values.size());
   }
   const std::vector<WeightedValue> sorted = SortedValues(means);
   return {Quantile(sorted, 0.025), Quantile(sorted, 0.975)};

@@ -124,7 +124,8 @@ ReportImage LinesImage(const StudyResults& results, const FactorGrid& grid,
       shown > 2 ? grid.factors[roles[2]].levels : std::vector{std::string()};
   std::vector<std::size_t> at(grid.factors.size(), 0);
   for (std::size_t p = 0; p < panels.size(); ++p) {
-    plot.panels.push_back({panels[p], {}});
+    plot.panels.push_back(
+        {shown > 2 ? fmt::format("{} = {}", grid.factors[roles[2]].name, panels[p]) : "", {}});
     at[roles[std::min<std::size_t>(2, roles.size() - 1)]] = p;
     for (std::size_t n = 0; n < plot.lines.size(); ++n) {
       plot.panels[p].lines.emplace_back();
@@ -138,8 +139,11 @@ ReportImage LinesImage(const StudyResults& results, const FactorGrid& grid,
     }
   }
   const std::string parallel =
-      shown > 1 ? " Where lines are not parallel, the effect of one factor depends on the other."
-                : "";
+      shown > 1 ? fmt::format(
+                      " Lines: {}. If they are not parallel, the effect of one factor depends "
+                      "on the other.",
+                      grid.factors[roles[1]].name)
+                : std::string();
   return {FactorPlotSvg(plot),
           fmt::format("Means over {}{}. Whiskers: 95 % intervals without the differences between "
                       "subjects.{}",

@@ -53,9 +53,9 @@ struct StudyComparison {
   std::vector<std::string> notes;             // left-out subjects and trials
 };
 
-// The treatments that are paired. kAll: every two of them, the earlier one as the reference. kMatched:
-// each treatment of a later study with the one of the same label in the first study, else with the
-// best of the first study. Fewer pairs make Holm's correction milder.
+// The treatments that are paired. kAll: every two of them, the earlier one as the reference.
+// kMatched: each treatment of a later study with the one of the same label in the first study, else
+// with the best of the first study. Fewer pairs make Holm's correction milder.
 enum class ComparedPairs { kAll, kMatched };
 
 struct CompareOptions {

@@ -48,7 +48,8 @@ def work(browser, program, study, folder):
     assert browser.run(FINISHED) == 54
     assert "Factors" in browser.run(HEADINGS), browser.run(HEADINGS)
     assert "Trials" in browser.run(IS_OPEN)
-    assert browser.complaints() == [], browser.complaints()
+    complaints = browser.complaints()
+    assert complaints == [], complaints
     browser.open(f"file://{os.path.abspath(folder)}/report.html")
     height = browser.run(HEIGHT)
     assert height < 10 * SCREEN[1], height

@@ -196,7 +196,8 @@ TEST(FactorSection, AThirdFactorMakesPanels) {
   const auto sections = FactorSections(results, FindFactorGrid(results));
   ASSERT_THAT(sections, SizeIs(2));
   EXPECT_THAT(sections[0].images, SizeIs(2)) << "no heat map";
-  EXPECT_THAT(sections[0].images[0].bytes, AllOf(HasSubstr(">flat<"), HasSubstr(">split<")));
+  EXPECT_THAT(sections[0].images[0].bytes,
+              AllOf(HasSubstr(">emitter = flat<"), HasSubstr(">emitter = split<")));
   EXPECT_THAT(sections[0].tables[0].rows, SizeIs(7)) << "three effects, three interactions, rest";
   EXPECT_THAT(sections[1].tables[0].rows, SizeIs(5)) << "four combinations and the mean";
 }
