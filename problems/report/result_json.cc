@@ -230,15 +230,19 @@ std::string RoleName(const Dowel& dowel) {
   return dowel.role == PointRole::kInserted ? "inserted" : "landmark";
 }
 
-std::string TimingJson(const std::vector<StepTime>& times, std::optional<double> cpu_s) {
-  Json json = {
-      {"total_wall_s", 0}, {"cpu_s", cpu_s ? Json(*cpu_s) : Json()}, {"steps", Json::array()}};
-  double total_s = 0;
+std::string TimingJson(const std::vector<StepTime>& times) {
+  Json json = {{"total_wall_s", 0}, {"cpu_s", 0}, {"steps", Json::array()}};
+  double wall_s = 0, cpu_s = 0;
   for (const StepTime& time : times) {
-    json["steps"].push_back({{"step", time.step}, {"wall_s", time.wall_s}});
-    total_s += time.wall_s;
+    json["steps"].push_back({{"step", time.step},
+                             {"wall_s", time.wall_s},
+                             {"cpu_s", time.cpu_s},
+                             {"peak_mb", time.peak_mb}});
+    wall_s += time.wall_s;
+    cpu_s += time.cpu_s;
   }
-  json["total_wall_s"] = total_s;
+  json["total_wall_s"] = wall_s;
+  json["cpu_s"] = cpu_s;
   return json.dump(2) + "\n";
 }
 

@@ -51,11 +51,9 @@ nlohmann::ordered_json StepsToJson(const FitResult& fit);
 std::string RoleName(const Dowel& dowel);
 
 // timing.json of a run, a depth study, a fit of points or a trial:
-//   {"total_wall_s": sum of the steps, "cpu_s": processor time or null,
-//    "steps": [{"step": name, "wall_s": seconds}, ...] in the order in which they ran}
-// `cpu_s` is the processor time of the whole job if it was measured. It does not contain work that
-// other jobs did for this one.
-std::string TimingJson(const std::vector<StepTime>& times,
-                       std::optional<double> cpu_s = std::nullopt);
+//   {"total_wall_s", "cpu_s": sums over the steps,
+//    "steps": [{"step": name, "wall_s", "cpu_s", "peak_mb"}, ...] in the order in which they ran}
+// A step that took its result from another job counts only what it did itself.
+std::string TimingJson(const std::vector<StepTime>& times);
 
 }  // namespace semblance::problems

@@ -12,6 +12,7 @@
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/input_contents.h"
 #include "problems/experiment/metrics/face_metrics.h"
+#include "problems/experiment/step_clock.h"
 #include "problems/face/bust/bust_files.h"
 #include "problems/io/manifest.h"
 #include "problems/report/result_json.h"
@@ -183,19 +184,23 @@ std::string ManifestJson(Json provenance, const OutputFolder& folder) {
 
 void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolder& folder,
               const RunContext& context) {
-  context.Report("write");
+  StepClock step(context, result.times);
   std::filesystem::remove(folder.Root() / "manifest.json");  // left by an earlier run
-  folder.Write("resolved.yaml", WriteConfig(experiment));
-  folder.Write("result.json", WithPlainTexts(ResultJson(experiment, result)).dump(2) + "\n");
-  folder.Write("dowels.csv", DowelsCsv(result));
-  folder.Write("seeds.csv", SeedsCsv(result));
-  WriteMeshes(result, folder, context);
-  WritePictures(result, folder, context);
-  folder.Write("scene.json", SceneJson(result, context));
-  const Json provenance = Provenance(experiment, result);
-  folder.Write("provenance.json", provenance.dump(2) + "\n");
-  WriteReport(folder);
-  folder.Write("timing.json", TimingJson(result.times));
+  step("write tables and meshes", [&] {
+    folder.Write("resolved.yaml", WriteConfig(experiment));
+    folder.Write("result.json", WithPlainTexts(ResultJson(experiment, result)).dump(2) + "\n");
+    folder.Write("dowels.csv", DowelsCsv(result));
+    folder.Write("seeds.csv", SeedsCsv(result));
+    WriteMeshes(result, folder, context);
+  });
+  step("write pictures", [&] { WritePictures(result, folder, context); });
+  step("write 3-D view", [&] { folder.Write("scene.json", SceneJson(result, context)); });
+  const Json provenance = step("hash inputs", [&] { return Provenance(experiment, result); });
+  step("write report", [&] {
+    folder.Write("provenance.json", provenance.dump(2) + "\n");
+    WriteReport(folder);
+  });
+  folder.Write("timing.json", TimingJson(step.Take()));
   folder.Write("manifest.json", ManifestJson(provenance, folder));
 }
 

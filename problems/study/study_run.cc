@@ -148,12 +148,6 @@ void RequireSameInputs(const Experiment& experiment, const InputContents& conten
   }
 }
 
-double ThreadCpu_s() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
-
 std::shared_ptr<const DiskCache> OpenDiskCache(const StudyRunOptions& options) {
   constexpr std::uintmax_t kMegabyte = 1'000'000;
   return options.cache.empty()
@@ -305,11 +299,10 @@ class StudyRunner {
   void RunTrial(const StudyTrial& trial) {
     Json json = TrialHead(plan_, trial);
     Files write = [](OutputFolder&) {};
-    const double cpu_before_s = ThreadCpu_s();
     try {
-      write = plan_.job == StudyJob::kFace    ? RunFace(trial, cpu_before_s, json)
-              : plan_.job == StudyJob::kDepth ? RunDepth(trial, cpu_before_s, json)
-                                              : RunIdentify(trial, cpu_before_s, json);
+      write = plan_.job == StudyJob::kFace    ? RunFace(trial, json)
+              : plan_.job == StudyJob::kDepth ? RunDepth(trial, json)
+                                              : RunIdentify(trial, json);
     } catch (const Cancelled&) {
       throw;
     } catch (const std::bad_alloc&) {
@@ -383,16 +376,16 @@ class StudyRunner {
     }
   }
 
-  Files RunFace(const StudyTrial& trial, double cpu_before_s, Json& json) {
+  Files RunFace(const StudyTrial& trial, Json& json) {
     auto result = std::make_shared<const RunResult>(
         problems::Run(WithoutUnusedBust(trial.experiment), Quiet(), &cache_));
     SetStatus(result->Faults(), json);
     json["result"] = ResultJson(trial.experiment, *result);
     AddOwnMetrics({.run = result.get(), .numbers = json["result"]}, json["result"]);
-    return FilesOfRun(trial, result, ThreadCpu_s() - cpu_before_s);
+    return FilesOfRun(trial, result);
   }
 
-  Files RunIdentify(const StudyTrial& trial, double cpu_before_s, Json& json) {
+  Files RunIdentify(const StudyTrial& trial, Json& json) {
     const auto own = std::ranges::find(plan_.gallery, trial.subject, &GalleryEntry::name);
     if (own == plan_.gallery.end()) {
       throw InputError(
@@ -405,35 +398,33 @@ class StudyRunner {
     SetStatus(result->run.Faults(), json);
     json["result"] = IdentifyResultJson(trial.experiment, *result);
     AddOwnMetrics({.run = &result->run, .numbers = json["result"]}, json["result"]);
-    return FilesOfRun(trial, {result, &result->run}, ThreadCpu_s() - cpu_before_s);
+    return FilesOfRun(trial, {result, &result->run});
   }
 
-  Files FilesOfRun(const StudyTrial& trial, const std::shared_ptr<const RunResult>& result,
-                   double cpu_s) const {
-    return [this, &trial, result, cpu_s](OutputFolder& output) {
+  Files FilesOfRun(const StudyTrial& trial, const std::shared_ptr<const RunResult>& result) const {
+    return [this, &trial, result](OutputFolder& output) {
       const RunContext quiet;
       if (plan_.keep == TrialFiles::kRun) {
         WriteRun(trial.experiment, *result, output, quiet);
       }
-      output.Write("timing.json", TimingJson(result->times, cpu_s), Durability::kUnsynced);
+      output.Write("timing.json", TimingJson(result->times), Durability::kUnsynced);
       if (plan_.keep == TrialFiles::kView) {
         output.Write("scene.json", SceneJson(*result, quiet));
       }
     };
   }
 
-  Files RunDepth(const StudyTrial& trial, double cpu_before_s, Json& json) {
+  Files RunDepth(const StudyTrial& trial, Json& json) {
     auto result =
         std::make_shared<const DepthResult>(MeasureDepth(trial.experiment, Quiet(), &cache_));
     SetStatus(result->Faults(), json);
     json["result"] = DepthResultJson(trial.experiment, *result);
     AddOwnMetrics({.depth = result.get(), .numbers = json["result"]}, json["result"]);
-    const double cpu_s = ThreadCpu_s() - cpu_before_s;
-    return [this, &trial, result, cpu_s](OutputFolder& output) {
+    return [this, &trial, result](OutputFolder& output) {
       if (plan_.keep == TrialFiles::kRun) {
         WriteDepth(trial.experiment, *result, output, {});
       }
-      output.Write("timing.json", TimingJson(result->times, cpu_s), Durability::kUnsynced);
+      output.Write("timing.json", TimingJson(result->times), Durability::kUnsynced);
       if (plan_.keep == TrialFiles::kView && trial.subject == plan_.trials.front().subject) {
         output.Write("depth.png", DepthPicture(*result, 1));
       }
