@@ -1,9 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "surfaces/mesh/mesh_query.h"
 
-#include <CGAL/AABB_traits.h>
-#include <CGAL/AABB_tree.h>
-#include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Kd_tree.h>
 #include <CGAL/Orthogonal_k_neighbor_search.h>
 #include <CGAL/Search_traits_3.h>
@@ -19,6 +16,7 @@
 
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/mesh/triangle_tree.h"
 
 namespace semblance::surfaces {
 namespace {
@@ -72,15 +70,7 @@ TrianglePoint ClosestPointOnTriangle(const Vec3& p, const Vec3& a, const Vec3& b
 
 namespace {
 
-using QueryKernel = CGAL::Simple_cartesian<double>;
-using Triangles = std::vector<QueryKernel::Triangle_3>;
-using Primitive = CGAL::AABB_triangle_primitive<QueryKernel, Triangles::const_iterator>;
-using Traits = CGAL::AABB_traits<QueryKernel, Primitive>;
-
-QueryKernel::Point_3 ToCgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
-Vec3 ToVec(const QueryKernel::Point_3& p) { return {p.x(), p.y(), p.z()}; }
-
-Triangles CopyTriangles(const TriMesh& mesh) {
+const TriMesh& Searchable(const TriMesh& mesh) {
   if (mesh.triangles.empty()) {
     throw InputError("mesh query: the mesh has no triangles; give one with at least one");
   }
@@ -89,74 +79,19 @@ Triangles CopyTriangles(const TriMesh& mesh) {
       throw InputError(fmt::format("mesh query: point {} is not finite; repair the mesh first", i));
     }
   }
-  Triangles triangles;
-  triangles.reserve(mesh.triangles.size());
-  for (const Triangle& t : mesh.triangles) {
-    triangles.emplace_back(ToCgal(mesh.points[t[0]]), ToCgal(mesh.points[t[1]]),
-                           ToCgal(mesh.points[t[2]]));
-  }
-  return triangles;
-}
-
-// The largest number of triangles whose first corners are equal.
-int MostWithOneCorner(const Triangles& triangles) {
-  std::vector<QueryKernel::Point_3> corners;
-  corners.reserve(triangles.size());
-  for (const auto& triangle : triangles) {
-    corners.push_back(triangle.vertex(0));
-  }
-  std::ranges::sort(corners);
-  int most = 0, equal = 0;
-  for (std::size_t k = 0; k < corners.size(); ++k) {
-    equal = k > 0 && corners[k] == corners[k - 1] ? equal + 1 : 1;
-    most = std::max(most, equal);
-  }
-  return most;
+  return mesh;
 }
 
 }  // namespace
 
-struct MeshQuery::Tree {
-  // Rays skip triangles without area, for which CGAL's intersection is undefined; they meet the
-  // neighbours instead. Closest points may lie on any triangle.
-  struct RayTraits : Traits {
-    struct Intersection {
-      using Hit = Traits::Intersection_and_primitive_id<QueryKernel::Segment_3>::Type;
-      boost::optional<Hit> operator()(const QueryKernel::Segment_3& ray,
-                                      const Primitive& triangle) const {
-        if (triangle.datum().is_degenerate()) return boost::none;
-        return traits.Traits::intersection_object()(ray, triangle);
-      }
-      const RayTraits& traits;
-    };
-    Intersection intersection_object() const { return {*this}; }
-  };
+struct MeshQuery::Tree : TriangleTree {
+  explicit Tree(const TriMesh& mesh) : TriangleTree(Searchable(mesh)) {}
 
-  // CGAL splits the first corners of the triangles until few are left, one call deeper each time,
-  // so very many equal ones overflow the stack.
-  static constexpr int kMostWithOneCorner = 1000;
-
-  explicit Tree(const TriMesh& mesh)
-      : triangles(CopyTriangles(mesh)), tree(triangles.cbegin(), triangles.cend()) {
-    tree.build();  // here, so that const queries from several threads never build it
-    if (MostWithOneCorner(triangles) <= kMostWithOneCorner) {
-      tree.accelerate_distance_queries();
-    } else {
-      tree.do_not_accelerate_distance_queries();
-    }
+  MeshPoint PointAt(const RayHit& hit, double length_mm) const {
+    const auto& [a, b, c] = Corners(hit.triangle);
+    return {hit.weights[0] * a + hit.weights[1] * b + hit.weights[2] * c, hit.triangle,
+            hit.along * length_mm, hit.weights};
   }
-  MeshPoint PointAt(const Vec3& position, const Triangles::const_iterator& triangle,
-                    const Vec3& from) const {
-    const Vec3 weights =
-        ClosestPointOnTriangle(position, ToVec(triangle->vertex(0)), ToVec(triangle->vertex(1)),
-                               ToVec(triangle->vertex(2)))
-            .weights;
-    return {position, static_cast<int>(triangle - triangles.cbegin()), (position - from).norm(),
-            weights};
-  }
-
-  Triangles triangles;
-  CGAL::AABB_tree<RayTraits> tree;
 };
 
 MeshQuery::MeshQuery(const TriMesh& mesh) : tree_(std::make_unique<Tree>(mesh)) {}
@@ -165,24 +100,21 @@ MeshQuery::MeshQuery(MeshQuery&&) noexcept = default;
 MeshQuery& MeshQuery::operator=(MeshQuery&&) noexcept = default;
 
 MeshPoint MeshQuery::Closest(const Vec3& p) const {
-  const auto found = tree_->tree.closest_point_and_primitive(ToCgal(p));
-  return tree_->PointAt(ToVec(found.first), found.second, p);
+  const int triangle = tree_->Nearest(p);
+  const auto& [a, b, c] = tree_->Corners(triangle);
+  const TrianglePoint at = ClosestPointOnTriangle(p, a, b, c);
+  return {at.position, triangle, (at.position - p).norm(), at.weights};
 }
 
 std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direction,
                                           double max_distance_mm) const {
-  const Vec3 end = origin + max_distance_mm * direction.normalized();
-  const QueryKernel::Segment_3 segment(ToCgal(origin), ToCgal(end));
-  if (segment.is_degenerate()) return {};
-  std::vector<Tree::RayTraits::Intersection::Hit> found;
-  tree_->tree.all_intersections(segment, std::back_inserter(found));
+  const Vec3 ray = max_distance_mm * direction.normalized();
+  if (ray.isZero(0)) {
+    return {};
+  }
   std::vector<MeshPoint> hits;
-  for (const auto& hit : found) {
-    // A ray in the plane of a triangle meets it in a segment. The segment is left out, because the
-    // ray meets the neighbours in points.
-    if (const QueryKernel::Point_3* point = boost::get<QueryKernel::Point_3>(&hit.first)) {
-      hits.push_back(tree_->PointAt(ToVec(*point), hit.second, origin));
-    }
+  for (const RayHit& hit : tree_->AllHits(origin, ray)) {
+    hits.push_back(tree_->PointAt(hit, max_distance_mm));
   }
   std::sort(hits.begin(), hits.end(), [](const MeshPoint& a, const MeshPoint& b) {
     return std::pair(a.distance_mm, a.triangle) < std::pair(b.distance_mm, b.triangle);
@@ -192,8 +124,9 @@ std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direct
 
 std::optional<MeshPoint> MeshQuery::FirstHit(const Vec3& origin, const Vec3& direction,
                                              double max_distance_mm) const {
-  const std::vector<MeshPoint> hits = AllHits(origin, direction, max_distance_mm);
-  return hits.empty() ? std::nullopt : std::optional(hits.front());
+  const Vec3 ray = max_distance_mm * direction.normalized();
+  const RayHit hit = ray.isZero(0) ? RayHit{} : tree_->FirstHit(origin, ray);
+  return hit.triangle < 0 ? std::nullopt : std::optional(tree_->PointAt(hit, max_distance_mm));
 }
 
 namespace {
@@ -245,7 +178,10 @@ std::vector<bool> SeenFromOutside(const TriMesh& mesh, int threads) {
 
 namespace {
 
+using QueryKernel = CGAL::Simple_cartesian<double>;
 using Search = CGAL::Orthogonal_k_neighbor_search<CGAL::Search_traits_3<QueryKernel>>;
+
+QueryKernel::Point_3 ToCgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
 std::vector<QueryKernel::Point_3> CopyPoints(std::span<const Vec3> points) {
   if (points.empty()) {

@@ -71,7 +71,6 @@ TEST(MeshQuery, APointIsTheWeightedSumOfItsTrianglesCorners) {
   check(query.Closest(2 * sphere.points[7] - Vec3(3, -2, 5)));  // a corner, straight above it
 }
 
-// CGAL's own answer for a triangle whose corners lie on a line is undefined.
 // A mesh that is crushed to a point, beside one triangle.
 TEST(MeshQuery, ManyTrianglesAtOnePlace) {
   TriMesh mesh{.points = {{1, 2, 3}, {11, 2, 3}, {1, 12, 3}}, .triangles = {{0, 1, 2}}};
