@@ -12,6 +12,7 @@
 namespace semblance::surfaces {
 namespace {
 
+constexpr double kRoundOff = 1e-12;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 float RoundDown(double x) {
@@ -26,7 +27,9 @@ float RoundUp(double x) { return -RoundDown(-x); }
 // The tree
 // ---------------------------------------------------------------------------------------------
 
-TriangleTree::TriangleTree(const TriMesh& mesh) : place_(mesh.triangles.size()) {
+// The margin keeps triangles inside their box: a ray in a side of a box would end there.
+TriangleTree::TriangleTree(const TriMesh& mesh)
+    : margin_mm_(1e-7 * Bounds(mesh).diagonal().norm()), place_(mesh.triangles.size()) {
   std::vector<Item> items;
   items.reserve(mesh.triangles.size());
   for (const Triangle& t : mesh.triangles) {
@@ -87,8 +90,8 @@ std::int32_t TriangleTree::Build(const TriMesh& mesh, std::vector<Item>& items, 
       }
     }
     for (int axis = 0; axis < 3; ++axis) {
-      nodes_[index].low[axis] = RoundDown(box.min()[axis]);
-      nodes_[index].high[axis] = RoundUp(box.max()[axis]);
+      nodes_[index].low[axis] = RoundDown(box.min()[axis] - margin_mm_);
+      nodes_[index].high[axis] = RoundUp(box.max()[axis] + margin_mm_);
     }
     return index;
   }
@@ -227,7 +230,6 @@ struct TriangleTree::Ray {
 
   // Returns whether the ray meets the box before `last`.
   bool Meets(const Node& node, double last) const {
-    constexpr double kSlack = 1e-12;  // round-off
     double entry = 0, exit = last;
     for (int axis = 0; axis < 3; ++axis) {
       const double a = (node.low[axis] - origin[axis]) * inverse[axis];
@@ -235,9 +237,10 @@ struct TriangleTree::Ray {
       entry = std::max(entry, std::min(a, b));
       exit = std::min(exit, std::max(a, b));
     }
-    return entry <= exit + kSlack * (1 + std::abs(exit));
+    return entry <= exit + kRoundOff * (1 + std::abs(exit));
   }
 
+  // A ray that passes a corner or a border within round-off meets it.
   std::optional<RayHit> Meet(const std::array<Vec3, 3>& corners) const {
     std::array<double, 3> px, py, pz;
     for (int k = 0; k < 3; ++k) {
@@ -249,10 +252,15 @@ struct TriangleTree::Ray {
     const Vec3 areas(px[2] * py[1] - py[2] * px[1], px[0] * py[2] - py[0] * px[2],
                      px[1] * py[0] - py[1] * px[0]);
     const double sum = areas.sum();
-    if ((areas.minCoeff() < 0 && areas.maxCoeff() > 0) || sum == 0) {
+    if (sum == 0) {
       return std::nullopt;
     }
-    const Vec3 weights = areas / sum;
+    Vec3 weights = areas / sum;
+    if (!(weights.minCoeff() >= -kRoundOff)) {
+      return std::nullopt;
+    }
+    weights = weights.cwiseMax(0);
+    weights /= weights.sum();
     const double along = weights[0] * pz[0] + weights[1] * pz[1] + weights[2] * pz[2];
     return along >= 0 && along <= 1 ? std::optional(RayHit{along, -1, weights}) : std::nullopt;
   }

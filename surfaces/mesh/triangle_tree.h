@@ -63,6 +63,7 @@ class TriangleTree {
   template <class Visit>
   void VisitHits(const Ray& ray, const Visit& visit) const;
 
+  double margin_mm_;  // of the boxes
   std::vector<Node> nodes_;
   std::vector<std::array<Vec3, 3>> corners_;  // of the triangles, leaf by leaf
   std::vector<std::int32_t> triangle_;        // index in the mesh, per entry of corners_

@@ -138,5 +138,31 @@ TEST(TriangleTree, NoRayLeavesAClosedSurfaceBetweenItsTriangles) {
   }
 }
 
+TEST(TriangleTree, ARayInTheSideOfABoxMeetsTheTriangleThere) {
+  const TriMesh plate = testing::Plate(8, 8);  // its corners are whole numbers
+  const TriangleTree tree(plate);
+  for (const Vec3& corner : plate.points) {
+    for (const double way : {-10, 10}) {
+      EXPECT_GE(tree.FirstHit(corner - Vec3(0, 0, way / 2), {0.0, -0.0, way}).triangle, 0);
+    }
+  }
+}
+
+TEST(TriangleTree, ARayThroughACornerOfABorderMeetsIt) {
+  Random random(8);
+  for (int k = 0; k < 1000; ++k) {
+    const TriMesh one{.points = {random.InBox(-9, 9), random.InBox(-9, 9), random.InBox(-9, 9)},
+                      .triangles = {{0, 1, 2}}};
+    const TriangleTree tree(one);
+    const Vec3 direction = 20 * random.Direction();
+    for (const Vec3& corner : one.points) {
+      const RayHit hit = tree.FirstHit(corner - 0.5 * direction, direction);
+      ASSERT_EQ(hit.triangle, 0);
+      EXPECT_NEAR(hit.along, 0.5, 1e-9);
+      EXPECT_GE(hit.weights.minCoeff(), 0);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace semblance::surfaces
