@@ -34,10 +34,7 @@ class SurfaceCost final : public ceres::CostFunction {
         whitening_(seen.whitening) {
     set_num_residuals(static_cast<int>(whitening_.rows()));
     std::vector<int>& sizes = *mutable_parameter_block_sizes();
-    sizes = {7, static_cast<int>(row_.modes.cols())};
-    if (row_.field.size() > 0) {
-      sizes.push_back(static_cast<int>(3 * row_.field.size()));
-    }
+    sizes = ShapeBlockSizes(row_.modes.cols(), 3 * row_.field.size());
     first_vertex_ = sizes.size();
     sizes.insert(sizes.end(), 16, 3);
   }
@@ -45,9 +42,10 @@ class SurfaceCost final : public ceres::CostFunction {
   bool Evaluate(const double* const* parameters, double* residuals,
                 double** jacobians) const override {
     const std::size_t modes = row_.modes.cols(), field = 3 * row_.field.size();
+    const Eigen::VectorXd values = JoinShapeBlocks(ModelBlocks(), parameters);
     ShapeDerivatives derivatives;
-    Vec3 point = PlacedPoint(frame_, row_, {parameters[0], 7}, {parameters[1], modes},
-                             {field > 0 ? parameters[2] : nullptr, field}, &derivatives);
+    Vec3 point = PlacedPoint(frame_, row_, {values.data(), 7}, {values.data() + 7, modes},
+                             {values.data() + 7 + modes, field}, &derivatives);
     for (int k = 0; k < 16; ++k) {
       point += stencil_.weight[k] * Eigen::Map<const Vec3>(parameters[first_vertex_ + k]);
     }
@@ -61,12 +59,17 @@ class SurfaceCost final : public ceres::CostFunction {
   }
 
  private:
+  // Their sizes.
+  std::span<const int> ModelBlocks() const {
+    return std::span(parameter_block_sizes()).first(first_vertex_);
+  }
+
   void WriteModelJacobian(const ShapeDerivatives& derivatives, double** jacobians) const {
     Eigen::MatrixXd all(whitening_.rows(), 7 + row_.modes.cols() + 3 * row_.field.size());
     for (Eigen::Index r = 0; r < whitening_.rows(); ++r) {
       all.row(r) = DerivativeAlong(whitening_.row(r).transpose(), row_, derivatives);
     }
-    WriteShapeJacobian(all, row_, jacobians);
+    WriteShapeJacobian(all, ModelBlocks(), jacobians);
   }
 
   void WriteVertexJacobian(double** jacobians) const {

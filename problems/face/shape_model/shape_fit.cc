@@ -13,6 +13,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <ranges>
 #include <span>
 #include <utility>
 
@@ -312,9 +313,8 @@ void ShapeEstimator::Solve(bool pose_alone) {
     problem.AddResidualBlock(MakeShapeCost(frame_, one), loss, blocks);
   }
   if (pose_alone) {
-    problem.SetParameterBlockConstant(parameters_.coefficients.data());
-    if (parameters_.field.size() > 0) {
-      problem.SetParameterBlockConstant(parameters_.field.data());
+    for (double* const block : blocks | std::views::drop(1)) {  // all but the pose
+      problem.SetParameterBlockConstant(block);
     }
   }
   ceres::Solver::Options solver;
