@@ -16,6 +16,7 @@ namespace {
 
 constexpr std::array kViews = {View::kFront, View::kThreeQuarter, View::kSide};
 constexpr int kPictureWidth = 560, kPictureHeight = 640;
+constexpr double kPictureAspect = static_cast<double>(kPictureWidth) / kPictureHeight;
 
 // The box that all pictures frame: skull, face and dowels.
 Box3 Region(const RunResult& result) {
@@ -44,8 +45,7 @@ struct Album {
   const RunResult& result;
   OutputFolder& folder;
   int threads;
-  std::vector<Camera> cameras =
-      CamerasFor(kViews, Region(result), static_cast<double>(kPictureWidth) / kPictureHeight);
+  std::vector<Camera> cameras = CamerasFor(kViews, Region(result), kPictureAspect);
   ShadowMaps of_skull = {}, of_face = {}, of_skin = {};
 };
 
@@ -64,12 +64,15 @@ Scene SkullScene(const RunResult& result) {
 
 // Writes the head framed by itself. Returns it from the front in the frame of the other pictures.
 Image WriteBust(Album& album) {
-  const Scene head = HeadScene(album.result);
-  const RenderOptions options = PictureOptions(Lighting::kStudio);
-  album.folder.Write("pictures/bust.png",
-                     EncodePng(RenderViews(head, Bounds(album.result.bust->skin), kViews, options,
-                                           album.threads)));
-  return Render(head, album.cameras.front(), options, album.threads);
+  std::vector<Camera> cameras = CamerasFor(kViews, Bounds(album.result.bust->skin), kPictureAspect);
+  cameras.push_back(album.cameras.front());
+  ShadowMaps shadows;
+  std::vector<Image> sides = RenderAll(HeadScene(album.result), cameras,
+                                       PictureOptions(Lighting::kStudio), shadows, album.threads);
+  Image front = std::move(sides.back());
+  sides.pop_back();
+  album.folder.Write("pictures/bust.png", EncodePng(ContactSheet(sides)));
+  return front;
 }
 
 Colour StatusColour(SkinStatus status) {
@@ -194,10 +197,11 @@ SceneObject WaysObject(const RunResult& result) {
 }
 
 SceneObject SeedsObject(const RunResult& result) {
+  constexpr int kRings = 4;  // a seed covers a few pixels, and there are thousands
   SceneObject seeds{.mesh = {}, .material = PlasticMaterial(HexColour(0x2f7fc1))};
   for (const FitPoint& point : result.target.points) {
     if (point.role == PointRole::kSeed) {
-      Append(seeds.mesh, MakeSphere(point.position, 0.8));
+      Append(seeds.mesh, MakeSphere(point.position, 0.8, kRings));
     }
   }
   return seeds;

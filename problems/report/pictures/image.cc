@@ -30,29 +30,36 @@ void AppendBytes(png_structp png, png_bytep data, png_size_t size) {
 
 void Flush(png_structp) {}
 
+// Pixels row by row, 3 (RGB) or 4 (RGBA) bytes each.
+struct PixelRows {
+  int width = 0, height = 0, channels = 3;
+  const std::uint8_t* bytes = nullptr;
+};
+
 // Two of libpng's five filters: all five take 1.5 times as long and save no bytes. libpng reports
 // errors by longjmp, so no object in this function has a destructor.
-bool WriteRows(png_structp png, png_infop info, const Image& image, PngEffort effort) {
+bool WriteRows(png_structp png, png_infop info, const PixelRows& image, PngEffort effort) {
   const bool quick = effort == PngEffort::kQuick;
   if (setjmp(png_jmpbuf(png)) != 0) {
     return false;
   }
   png_set_IHDR(png, info, static_cast<png_uint_32>(image.width),
-               static_cast<png_uint_32>(image.height), 8, PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
+               static_cast<png_uint_32>(image.height), 8,
+               image.channels == 4 ? PNG_COLOR_TYPE_RGBA : PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE,
                PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_sRGB(png, info, PNG_sRGB_INTENT_PERCEPTUAL);
   png_set_filter(png, PNG_FILTER_TYPE_BASE, quick ? PNG_FILTER_UP : PNG_FILTER_SUB | PNG_FILTER_UP);
   png_set_compression_level(png, quick ? 2 : 4);
   png_write_info(png, info);
   for (int row = 0; row < image.height; ++row) {
-    png_write_row(png, &image.rgb[3 * static_cast<std::size_t>(row) * image.width]);
+    png_write_row(png, image.bytes + static_cast<std::size_t>(row) * image.width * image.channels);
   }
   png_write_end(png, info);
   return true;
 }
 
 // Returns false if libpng runs out of memory.
-bool WritePng(const Image& image, PngEffort effort, std::string& bytes) {
+bool WritePng(const PixelRows& image, PngEffort effort, std::string& bytes) {
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, nullptr);
   png_infop info = png != nullptr ? png_create_info_struct(png) : nullptr;
   if (info != nullptr) {
@@ -127,19 +134,17 @@ RgbaImage Halved(const RgbaImage& image) {
   return half;
 }
 
-std::string EncodeRgba(const RgbaImage& image) {
-  png_image header{};
-  header.version = PNG_IMAGE_VERSION;
-  header.width = static_cast<png_uint_32>(image.width);
-  header.height = static_cast<png_uint_32>(image.height);
-  header.format = PNG_FORMAT_RGBA;
-  std::string bytes(PNG_IMAGE_PNG_SIZE_MAX(header), '\0');
-  png_alloc_size_t size = bytes.size();
-  if (png_image_write_to_memory(&header, bytes.data(), &size, 0, image.bytes.data(), 0, nullptr) ==
-      0) {
-    throw InputError("picture: libpng cannot write it");
+std::string EncodePixels(const PixelRows& image, PngEffort effort) {
+  std::string bytes;
+  png_image largest{};
+  largest.width = static_cast<png_uint_32>(image.width);
+  largest.height = static_cast<png_uint_32>(image.height);
+  largest.format = image.channels == 4 ? PNG_FORMAT_RGBA : PNG_FORMAT_RGB;
+  bytes.reserve(PNG_IMAGE_PNG_SIZE_MAX(largest));  // so that AppendBytes allocates nothing
+  if (!WritePng(image, effort, bytes)) {
+    throw InputError(fmt::format("picture of {} x {} pixels: libpng cannot write it", image.width,
+                                 image.height));
   }
-  bytes.resize(size);
   return bytes;
 }
 
@@ -148,7 +153,8 @@ std::string EncodeRgba(const RgbaImage& image) {
 std::string PagePng(const std::string& png) {
   RgbaImage image = DecodePng(png);
   ClearBackground(image);
-  return EncodeRgba(Halved(image));
+  const RgbaImage half = Halved(image);
+  return EncodePixels({half.width, half.height, 4, half.bytes.data()}, PngEffort::kSmall);
 }
 
 Colour HexColour(std::uint32_t rrggbb) {
@@ -212,17 +218,7 @@ std::string EncodePng(const Image& image, PngEffort effort) {
     throw InputError(fmt::format("picture of {} x {} pixels with {} bytes: it has no valid pixels",
                                  image.width, image.height, image.rgb.size()));
   }
-  std::string bytes;
-  png_image largest{};
-  largest.width = static_cast<png_uint_32>(image.width);
-  largest.height = static_cast<png_uint_32>(image.height);
-  largest.format = PNG_FORMAT_RGB;
-  bytes.reserve(PNG_IMAGE_PNG_SIZE_MAX(largest));  // so that AppendBytes allocates nothing
-  if (!WritePng(image, effort, bytes)) {
-    throw InputError(fmt::format("picture of {} x {} pixels: libpng cannot write it", image.width,
-                                 image.height));
-  }
-  return bytes;
+  return EncodePixels({image.width, image.height, 3, image.rgb.data()}, effort);
 }
 
 }  // namespace semblance::problems

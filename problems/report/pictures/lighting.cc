@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/report/pictures/lighting.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <span>
 #include <stdexcept>
 
 #include "problems/report/pictures/raster.h"
@@ -10,17 +12,6 @@
 
 namespace semblance::problems {
 namespace {
-
-// Trades smooth shadows against time: each light costs a depth map, which all pictures share.
-constexpr int kSkyLights = 26;
-
-// Directions spread evenly over the sphere (Fibonacci lattice); z is up.
-Vec3 SphereDirection(int i, int count) {
-  const double z = 1 - (2 * i + 1.0) / count;
-  const double phi = i * std::numbers::pi * (3 - std::sqrt(5.0));
-  const double r = std::sqrt(1 - z * z);
-  return {r * std::cos(phi), r * std::sin(phi), z};
-}
 
 struct SoftBox {
   Vec3 towards;  // in the view: right, up, towards the viewer
@@ -45,26 +36,22 @@ void AddSoftBox(const SoftBox& box, const Mat3& view, std::vector<Light>& lights
   }
 }
 
-// Adds a sky on all sides. `top` and `bottom` are the relative radiances above and below the view.
-void AddDome(int count, double strength, double top, double bottom, const Mat3& view,
-             std::vector<Light>& lights) {
-  for (int i = 0; i < count; ++i) {
-    const Vec3 direction = SphereDirection(i, count);
-    const double radiance = bottom + (top - bottom) * 0.5 * (1 + view.row(1).dot(direction));
-    lights.push_back({.to_light = direction,
-                      .irradiance = Rgb::Constant(static_cast<float>(strength * radiance / count)),
-                      .is_key = false});
-  }
+// `top` and `bottom` are the relative radiances above and below the view.
+void SetSky(double strength, double top, double bottom, const Mat3& view, LightRig& rig) {
+  const double share = strength / kSkyLights;
+  rig.sky_colour = Rgb::Ones();
+  rig.sky_level = static_cast<float>(share * (bottom + top) / 2);
+  rig.sky_slope = (share * (top - bottom) / 2 * view.row(1).transpose()).cast<float>();
 }
 
 // The strengths of the studio lights are a matter of taste: key from the upper left, a weak fill
 // from the right, a rim light from behind.
-std::vector<Light> PlaceLights(Lighting lighting, const Mat3& view) {
-  std::vector<Light> lights;
+LightRig PlaceLights(Lighting lighting, const Mat3& view) {
+  LightRig rig;
   if (lighting == Lighting::kEven) {
-    AddSoftBox({.towards = {0, 0, 1}, .strength = 0.55}, view, lights);
-    AddDome(kSkyLights, 2.0, 1, 1, view, lights);
-    return lights;
+    AddSoftBox({.towards = {0, 0, 1}, .strength = 0.55}, view, rig.lights);
+    SetSky(2.0, 1, 1, view, rig);
+    return rig;
   }
   AddSoftBox({.towards = {-0.62, 0.62, 0.62},
               .radius = 0.28,
@@ -72,21 +59,21 @@ std::vector<Light> PlaceLights(Lighting lighting, const Mat3& view) {
               .strength = 1.0,
               .colour = {1.0F, 0.965F, 0.91F},
               .is_key = true},
-             view, lights);
+             view, rig.lights);
   AddSoftBox({.towards = {0.8, 0.05, 0.6},
               .radius = 0.2,
               .lights = 3,
               .strength = 0.22,
               .colour = {0.90F, 0.95F, 1.0F}},
-             view, lights);
+             view, rig.lights);
   AddSoftBox({.towards = {0.75, 0.45, -0.55},
               .radius = 0.1,
               .lights = 2,
               .strength = 0.55,
               .colour = {0.95F, 0.97F, 1.0F}},
-             view, lights);
-  AddDome(kSkyLights, 1.3, 1.0, 0.4, view, lights);
-  return lights;
+             view, rig.lights);
+  SetSky(1.3, 1.0, 0.4, view, rig);
+  return rig;
 }
 
 Mat3 ViewTowards(const Vec3& to_viewer) {
@@ -157,23 +144,54 @@ Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
   return sum;
 }
 
-void LightVertex(const Material& material, const std::vector<Light>& lights,
-                 const std::vector<const ShadowMap*>& maps, SceneVertex& vertex) {
-  const Rgb scatter = material.scatter_mm.cast<float>().array();
+// The share of one light that reaches the vertex, times its wrapped cosine.
+Rgb ShareOfLight(const Material& material, const SceneVertex& vertex, const Vec3& to_light,
+                 const ShadowMap& map, Rgb& through) {
   const auto wrap = static_cast<float>(material.wrap);
-  float key_all = 0, key_seen = 0;
-  for (std::size_t i = 0; i < lights.size(); ++i) {
-    const auto cosine = static_cast<float>(vertex.normal.dot(lights[i].to_light));
-    const float wrapped = (cosine + wrap) / (1 + wrap);
-    if (wrapped <= 0) {
-      continue;
+  const float wrapped = (static_cast<float>(vertex.normal.dot(to_light)) + wrap) / (1 + wrap);
+  if (wrapped <= 0) {
+    return Rgb::Zero();
+  }
+  // Starts 1.5 texels above the surface, so that the surface does not shade itself.
+  const Vec3 above = vertex.position + 1.5 / map.projection.samples_per_mm * vertex.normal;
+  through = LightThrough(map, above, material.scatter_mm.cast<float>().array());
+  return wrapped * through;
+}
+
+using MapList = std::vector<const ShadowMap*>;
+
+SkyShare FindSkyShare(const Material& material, std::span<const Vec3> sky, const MapList& maps,
+                      const SceneVertex& vertex) {
+  SkyShare share{.sum = Rgb::Zero()};
+  for (std::size_t light = 0; light < sky.size(); ++light) {
+    const Vec3& direction = sky[light];
+    Rgb through;
+    const Rgb part = ShareOfLight(material, vertex, direction, *maps[light], through);
+    share.sum += part;
+    for (int axis = 0; axis < 3; ++axis) {
+      share.along[axis] += static_cast<float>(direction[axis]) * part;
     }
-    // Starts 1.5 texels above the surface, so that the surface does not shade itself.
-    const Vec3 above = vertex.position + 1.5 / maps[i]->projection.samples_per_mm * vertex.normal;
-    const Rgb through = LightThrough(*maps[i], above, scatter);
-    vertex.light += wrapped * through * lights[i].irradiance;
-    key_all += lights[i].is_key ? 1.0F : 0.0F;
-    key_seen += lights[i].is_key ? through[1] : 0.0F;
+  }
+  return share;
+}
+
+void LightVertex(const Material& material, const LightRig& rig, const MapList& maps,
+                 const SkyShare& sky, SceneVertex& vertex) {
+  vertex.light = rig.sky_level * sky.sum;
+  for (int axis = 0; axis < 3; ++axis) {
+    vertex.light += rig.sky_slope[axis] * sky.along[axis];
+  }
+  vertex.light *= rig.sky_colour;
+  float key_all = 0, key_seen = 0;
+  for (std::size_t i = 0; i < rig.lights.size(); ++i) {
+    const Light& light = rig.lights[i];
+    Rgb through = Rgb::Constant(-1);  // stays: the surface faces away
+    vertex.light +=
+        ShareOfLight(material, vertex, light.to_light, *maps[i], through) * light.irradiance;
+    if (light.is_key && through[1] >= 0) {
+      key_all += 1;
+      key_seen += through[1];
+    }
   }
   vertex.key = key_all > 0 ? key_seen / key_all : 0;
 }
@@ -191,23 +209,64 @@ Box3 BoundCasters(const FlatScene& flat, const std::vector<bool>& casts) {
 
 }  // namespace
 
-std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world) {
-  std::vector<Light> lights = PlaceLights(lighting, view_from_world);
+// Fibonacci's lattice; z is up.
+std::array<Vec3, kSkyLights> SkyDirections() {
+  std::array<Vec3, kSkyLights> directions;
+  for (int k = 0; k < kSkyLights; ++k) {
+    const double z = 1 - (2 * k + 1.0) / kSkyLights;
+    const double phi = k * std::numbers::pi * (3 - std::sqrt(5.0));
+    const double r = std::sqrt(1 - z * z);
+    directions[k] = {r * std::cos(phi), r * std::sin(phi), z};
+  }
+  return directions;
+}
+
+LightRig MakeLightRig(Lighting lighting, const Mat3& view_from_world) {
+  LightRig rig = PlaceLights(lighting, view_from_world);
   Rgb facing = Rgb::Zero();
-  for (const Light& light : lights) {
-    const double cosine = view_from_world.row(2).dot(light.to_light);
-    facing += static_cast<float>(std::max(0.0, cosine)) * light.irradiance;
+  const auto add = [&](const Vec3& to_light, const Rgb& irradiance) {
+    const double cosine = view_from_world.row(2).dot(to_light);
+    facing += static_cast<float>(std::max(0.0, cosine)) * irradiance;
+  };
+  for (const Light& light : rig.lights) {
+    add(light.to_light, light.irradiance);
+  }
+  for (const Vec3& direction : SkyDirections()) {
+    add(direction, rig.FromSky(direction));
   }
   // 0.86 leaves room for highlights below white.
   const float exposure = lighting == Lighting::kEven ? 1.0F : 0.86F;
-  for (Light& light : lights) {
+  for (Light& light : rig.lights) {
     light.irradiance *= exposure / facing;
   }
-  return lights;
+  rig.sky_colour *= exposure / facing;
+  return rig;
 }
 
-void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
-                   ShadowMaps& maps, FlatScene& flat) {
+namespace {
+
+// The maps of the lights in these directions. Renders those that are missing.
+MapList FindMaps(std::span<const Vec3> to_light, const FlatScene& flat,
+                 const std::vector<bool>& casts, int threads, ShadowMaps& maps) {
+  MapList found;
+  std::vector<std::pair<Vec3, ShadowMap*>> missing;
+  for (const Vec3& d : to_light) {
+    const auto [map, is_new] = maps.of_direction.try_emplace({d.x(), d.y(), d.z()});
+    found.push_back(&map->second);
+    if (is_new) {
+      missing.emplace_back(d, &map->second);
+    }
+  }
+  ParallelFor(missing.size(), threads, 1, [&](std::size_t i) {
+    *missing[i].second = RenderShadowMap(flat, casts, maps, missing[i].first);
+  });
+  return found;
+}
+
+}  // namespace
+
+void LightVertices(const Scene& scene, const LightRig& rig, int threads, ShadowMaps& maps,
+                   FlatScene& flat) {
   std::vector<bool> casts;
   for (const SceneObject& object : scene.objects) {
     casts.push_back(object.opacity >= 1);
@@ -217,25 +276,21 @@ void LightVertices(const Scene& scene, const std::vector<Light>& lights, int thr
     throw std::logic_error("shadows of a scene with other meshes");
   }
   maps.box = box;
-  std::vector<const ShadowMap*> map_of_light;
-  std::vector<std::pair<Vec3, ShadowMap*>> missing;
-  for (const Light& light : lights) {
-    const Vec3& d = light.to_light;
-    const auto [map, is_new] = maps.of_direction.try_emplace({d.x(), d.y(), d.z()});
-    map_of_light.push_back(&map->second);
-    if (is_new) {
-      missing.emplace_back(d, &map->second);
-    }
-  }
-  ParallelFor(missing.size(), threads, 1, [&](std::size_t i) {
-    *missing[i].second = RenderShadowMap(flat, casts, maps, missing[i].first);
-  });
+  const std::array<Vec3, kSkyLights> sky = SkyDirections();
+  std::vector<Vec3> moving(rig.lights.size());
+  std::ranges::transform(rig.lights, moving.begin(), &Light::to_light);
+  const MapList of_sky = FindMaps(sky, flat, casts, threads, maps);
+  const MapList of_lights = FindMaps(moving, flat, casts, threads, maps);
+  flat.sky.resize(flat.vertices.size());
   ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {
     if (!flat.is_seen.empty() && !flat.is_seen[v]) {
       return;
     }
-    LightVertex(scene.objects[flat.object_of_vertex[v]].material, lights, map_of_light,
-                flat.vertices[v]);
+    const Material& material = scene.objects[flat.object_of_vertex[v]].material;
+    if (std::isnan(flat.sky[v].sum[0])) {
+      flat.sky[v] = FindSkyShare(material, sky, of_sky, flat.vertices[v]);
+    }
+    LightVertex(material, rig, of_lights, flat.sky[v], flat.vertices[v]);
   });
 }
 

@@ -21,10 +21,35 @@ struct Light {
   bool is_key = false;           // only key lights cause highlights
 };
 
-// The lights of a picture. They move with the camera, except for a sky whose directions are fixed
-// in the world. A surface that faces the viewer outside all shadows receives exactly 1 under kEven,
-// and a little less under kStudio, which leaves room for highlights.
-std::vector<Light> LightRig(Lighting lighting, const Mat3& view_from_world);
+// The lights of a picture. The sky is kSkyLights lights whose directions are fixed in the world, so
+// that its shadows serve every picture of a scene.
+struct LightRig {
+  std::vector<Light> lights;  // these move with the camera
+  // The irradiance of each light of the sky, with the unit direction d to it, is
+  // sky_colour (sky_level + sky_slope . d).
+  Rgb sky_colour = Rgb::Zero();
+  float sky_level = 0;
+  Eigen::Vector3f sky_slope = Eigen::Vector3f::Zero();
+
+  Rgb FromSky(const Vec3& direction) const {
+    return sky_colour * (sky_level + sky_slope.dot(direction.cast<float>()));
+  }
+};
+
+// A surface that faces the viewer outside all shadows receives exactly 1 under kEven, and a little
+// less under kStudio, which leaves room for highlights.
+LightRig MakeLightRig(Lighting lighting, const Mat3& view_from_world);
+
+// Trades smooth shadows against time: each light costs a depth map, which all pictures share.
+inline constexpr int kSkyLights = 26;
+std::array<Vec3, kSkyLights> SkyDirections();  // unit; spread evenly over the sphere
+
+// The shares of the sky's lights that a vertex receives, with their cosines: summed, and summed
+// times the direction along x, y and z. They give its light under any rig.
+struct SkyShare {
+  Rgb sum = Rgb::Constant(static_cast<float>(kNaN));  // NaN: not computed yet
+  std::array<Rgb, 3> along = {Rgb::Zero(), Rgb::Zero(), Rgb::Zero()};
+};
 
 struct SceneVertex {
   Vec3 position;  // mm
@@ -45,6 +70,7 @@ struct FlatScene {
   std::vector<SceneTriangle> triangles;
   std::vector<int> object_of_vertex;
   std::vector<bool> is_seen;  // one per vertex; empty: all are seen
+  std::vector<SkyShare> sky;  // one per vertex; empty: none is computed
 };
 
 // The depth of the nearest surface as seen from a light.
@@ -58,14 +84,15 @@ struct ShadowMap {
 struct ShadowMaps {
   // Texels along a side. Light is computed at vertices and interpolated between them, so a mesh
   // with few vertices needs few texels.
-  int texels = 512;
+  int texels = 320;
   std::map<std::array<double, 3>, ShadowMap> of_direction;  // to the light
   Box3 box;                                                 // of the opaque vertices
 };
 
-// Sets light and key of every vertex that is seen. Only opaque objects cast shadows. Adds missing
-// maps to `maps`. Throws std::logic_error if `maps` belongs to other meshes.
-void LightVertices(const Scene& scene, const std::vector<Light>& lights, int threads,
-                   ShadowMaps& maps, FlatScene& flat);
+// Sets light and key of every vertex that is seen, and its share of the sky if that is missing.
+// Only opaque objects cast shadows. Adds missing maps to `maps`. Throws std::logic_error if `maps`
+// belongs to other meshes.
+void LightVertices(const Scene& scene, const LightRig& rig, int threads, ShadowMaps& maps,
+                   FlatScene& flat);
 
 }  // namespace semblance::problems

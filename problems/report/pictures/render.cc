@@ -124,13 +124,14 @@ struct Layers {
 // The data that all bands share, prepared once per picture. Bands are painted independently.
 class Painter {
  public:
+  // flat: the scene's. The painter sets its light and must be its only user.
   Painter(const Scene& scene, const Camera& camera, const RenderOptions& options,
-          ShadowMaps& shadows, int threads)
+          ShadowMaps& shadows, int threads, FlatScene& flat)
       : scene_(scene),
         options_(options),
         to_viewer_(camera.view_from_world.row(2)),
-        lights_(LightRig(options.lighting, camera.view_from_world)),
-        flat_(Flatten(scene)),
+        rig_(MakeLightRig(options.lighting, camera.view_from_world)),
+        flat_(flat),
         has_sheer_(std::ranges::any_of(scene.objects,
                                        [](const SceneObject& o) { return o.opacity < 1; })) {
     const int s = options.supersampling;
@@ -147,7 +148,7 @@ class Painter {
     layers_.resize(Bands());
     ParallelFor(Bands(), threads, 1, [&](std::size_t band) { layers_[band] = FindNearest(band); });
     MarkSeen();
-    LightVertices(scene, lights_, threads, shadows, flat_);
+    LightVertices(scene, rig_, threads, shadows, flat_);
   }
 
   std::size_t Bands() const { return triangles_of_band_.size(); }
@@ -230,7 +231,7 @@ class Painter {
   // The direction half-way between viewer and key light (Blinn 1977). It is constant, because both
   // are far away.
   void SetHighlight() {
-    for (const Light& light : lights_) {
+    for (const Light& light : rig_.lights) {
       if (light.is_key) {
         key_light_ += light.irradiance;
         half_way_ += light.to_light;
@@ -343,8 +344,14 @@ class Painter {
   Rgb LightInside(const Vec3& normal) const {
     constexpr float kDimmed = 0.45F;  // dark enough to look like an inside
     Rgb sum = Rgb::Zero();
-    for (const Light& light : lights_) {
-      sum += static_cast<float>(std::max(0.0, -normal.dot(light.to_light))) * light.irradiance;
+    const auto add = [&](const Vec3& to_light, const Rgb& irradiance) {
+      sum += static_cast<float>(std::max(0.0, -normal.dot(to_light))) * irradiance;
+    };
+    for (const Light& light : rig_.lights) {
+      add(light.to_light, light.irradiance);
+    }
+    for (const Vec3& direction : sky_) {
+      add(direction, rig_.FromSky(direction));
     }
     return kDimmed * sum;
   }
@@ -352,8 +359,9 @@ class Painter {
   const Scene& scene_;
   const RenderOptions& options_;
   Vec3 to_viewer_;
-  std::vector<Light> lights_;
-  FlatScene flat_;
+  LightRig rig_;
+  std::array<Vec3, kSkyLights> sky_ = SkyDirections();
+  FlatScene& flat_;
   bool has_sheer_;
   Projection projection_;
   Vec3 half_way_ = Vec3::Zero();
@@ -422,9 +430,10 @@ Camera CameraFor(View view, const Box3& region, double aspect) {
 std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
                              const RenderOptions& options, ShadowMaps& shadows, int threads) {
   std::vector<Image> images;
+  FlatScene flat = Flatten(scene);
   for (const Camera& camera : cameras) {
     CheckOptions(camera, options);
-    const Painter painter(scene, camera, options, shadows, threads);
+    const Painter painter(scene, camera, options, shadows, threads, flat);
     Image& image = images.emplace_back(MakeImage(options.width, options.height, Colour{}));
     ParallelFor(painter.Bands(), threads, 1,
                 [&](std::size_t band) { painter.PaintBand(band, image); });

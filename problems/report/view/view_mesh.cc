@@ -48,8 +48,16 @@ TriMesh SimplifyForView(const TriMesh& mesh, int most_triangles) {
   if (static_cast<int>(mesh.triangles.size()) <= most_triangles) {
     return mesh;
   }
+  // A few times more triangles than in the end show every detail that remains then, so the way to
+  // them need not be measured.
+  constexpr int kRough = 4;
   try {
-    return Decimate(mesh, {.target_triangles = most_triangles}).mesh;
+    const bool is_large = static_cast<int>(mesh.triangles.size()) / 2 > kRough * most_triangles;
+    const TriMesh rough = is_large ? Decimate(mesh, {.target_triangles = kRough * most_triangles,
+                                                     .check = DecimateCheck::kNone})
+                                         .mesh
+                                   : TriMesh{};
+    return Decimate(is_large ? rough : mesh, {.target_triangles = most_triangles}).mesh;
   } catch (const InputError&) {  // a scan may hold edges that Decimate refuses
     // The cell edge for about most_triangles on a smooth surface. It need not be exact.
     return ClusterForView(mesh, std::sqrt(2.3 * Area(mesh) / most_triangles));
