@@ -66,6 +66,9 @@ class ProbeGrid {
   // True if the ball reached a place in which it touches p on the outer side of the normal.
   bool Touches(const Vec3& p, const Vec3& normal) const {
     const double reach_mm = probe_mm_ + std::numbers::sqrt3 * cell_mm_;
+    if (IsReached(p + (probe_mm_ + 0.5 * cell_mm_) * normal)) {
+      return true;  // the middle of that cell is within reach and outward: most of a skin ends here
+    }
     return ForRowsWithin(
         p, reach_mm, [&](std::size_t first, std::size_t last, const Vec3& offset_of_first) {
           double outward = offset_of_first.dot(normal);
@@ -84,6 +87,16 @@ class ProbeGrid {
 
   std::size_t IndexOf(const GridCell& c) const {
     return (std::size_t(c[2]) * size_[1] + c[1]) * size_[0] + c[0];
+  }
+  bool IsReached(const Vec3& p) const {
+    GridCell cell;
+    for (int axis = 0; axis < 3; ++axis) {
+      cell[axis] = static_cast<int>(std::floor((p[axis] - origin_[axis]) / cell_mm_));
+      if (cell[axis] < 0 || cell[axis] >= size_[axis]) {
+        return false;
+      }
+    }
+    return state_[IndexOf(cell)] == kReached;
   }
   Vec3 Middle(const GridCell& c) const {
     return origin_ + cell_mm_ * Vec3(c[0] + 0.5, c[1] + 0.5, c[2] + 0.5);
