@@ -182,6 +182,7 @@ class Decimator {
   void SetGeometry(const Vec3& target);
   void GatherSamples();
   bool IsWithinBounds();
+  bool IsCheap(double cost) const;
   void Collapse();
   void ForgetEdges();
   void Forget(HalfedgeHandle side);
@@ -414,12 +415,15 @@ void Decimator::TryCollapse(EdgeHandle edge) {
   if (!KeepsTopology()) {
     return;
   }
-  SetGeometry(TargetOf(around_.edge).position);
+  const MergeTarget target = TargetOf(around_.edge);
+  SetGeometry(target.position);
   if (!PreservesQuality(geometry_)) {
     return;
   }
   if (!originals_) {
-    Collapse();
+    if (IsCheap(target.cost)) {
+      Collapse();
+    }
     return;
   }
   GatherSamples();
@@ -491,6 +495,13 @@ bool Decimator::IsWithinBounds() {
   }
   tolerance_refused_ |= error_mm > options_.tolerance_mm;
   return error_mm <= options_.tolerance_mm;
+}
+
+// The bound of IsWithinBounds on the mean distance from the planes of the present triangles, which
+// is the cost over the area. Where two sides of thin bone meet, their area vectors cancel.
+bool Decimator::IsCheap(double cost) const {
+  const double area = AreaVectorAfter(geometry_).norm();
+  return cost <= kMostErrorOfSize * kMostErrorOfSize * area * area;
 }
 
 void Decimator::ReassignSamples() {

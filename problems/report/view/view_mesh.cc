@@ -50,7 +50,7 @@ TriMesh SimplifyForView(const TriMesh& mesh, int most_triangles) {
   }
   // A few times more triangles than in the end show every detail that remains then, so the way to
   // them need not be measured.
-  constexpr int kRough = 4;
+  constexpr int kRough = 6;
   try {
     const bool is_large = static_cast<int>(mesh.triangles.size()) / 2 > kRough * most_triangles;
     const TriMesh rough = is_large ? Decimate(mesh, {.target_triangles = kRough * most_triangles,
