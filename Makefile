@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 # The entry point: installs packages, builds, runs. Everything it needs to know is in .ci/packages.txt, CMakePresets.json and configs/.
-PACKAGES      = $(shell sed 's/#.*//' .ci/packages.txt)
-RUN_PACKAGES  = $(shell grep -v '# tests' .ci/packages.txt | sed 's/#.*//')
+PACKAGES      = $(shell grep -v '# profile' .ci/packages.txt | sed 's/#.*//')
+RUN_PACKAGES  = $(shell grep -Ev '# (tests|profile)' .ci/packages.txt | sed 's/#.*//')
 SUDO         := $(if $(filter 0,$(shell id -u)),,sudo)
 PRESET       ?= release
 BUILD        := $(if $(filter sanitize debug quick threads coverage,$(PRESET)),build-$(PRESET),build)
@@ -9,7 +9,7 @@ PROGRAM      := $(BUILD)/problems/semblance
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build demo demo-phantom deb site thesis test harness bench same-bytes clang-numbers sanitize races coverage \
+.PHONY: all setup configure build demo demo-phantom deb site thesis test harness bench profile same-bytes clang-numbers sanitize races coverage \
   format check headers tidy configs clean
 
 all: build
@@ -90,6 +90,13 @@ bench: build
 	@{ echo '{"machine": "'"$$(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | sed 's/^ //'), $$(nproc) cores"'",'; \
 	  echo '"entries": ['; grep '^{' build/bench.lines | sed '$$!s/$$/,/'; echo ']}'; } > build/bench.json; rm build/bench.lines
 	@echo build/bench.json
+
+# The cost of each step of a run, and its ten hottest functions. ONLY selects some of: demo vhm cthead trial.
+profile: PACKAGES = $(RUN_PACKAGES) $(shell grep -E '^python3 |# profile' .ci/packages.txt | sed 's/#.*//')
+profile: PRESET = quick
+profile: configure
+	@cmake --build --preset quick --target semblance
+	@/usr/bin/python3 -B tests/bench/profile.py build-quick/problems/semblance . $(ONLY)
 
 # A run, a depth and a fit in many environments, and by programs for older processors, give the same bytes.
 same-bytes: build
