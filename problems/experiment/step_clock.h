@@ -16,8 +16,8 @@ namespace semblance::problems {
 struct StepTime {
   std::string step;
   double wall_s = kNaN;
-  // Of all threads of the process, or of the calling thread if the job has only one: then other
-  // jobs may run beside it.
+  // The processor time of all threads of the process; in a job with one thread only of that thread,
+  // because other jobs may run beside it.
   double cpu_s = kNaN;
   // The most memory that the process has held in RAM from its start to the end of the step. It is
   // not reset before a step, because a reset would hide the peak from the tools that watch the

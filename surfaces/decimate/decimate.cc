@@ -498,7 +498,7 @@ bool Decimator::IsWithinBounds() {
 }
 
 // The bound of IsWithinBounds on the mean distance from the planes of the present triangles, which
-// is the cost over the area. Where two sides of thin bone meet, their area vectors cancel.
+// is the cost over the area. The area vectors of the two sides of thin bone cancel.
 bool Decimator::IsCheap(double cost) const {
   const double area = AreaVectorAfter(geometry_).norm();
   return cost <= kMostErrorOfSize * kMostErrorOfSize * area * area;

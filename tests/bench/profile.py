@@ -28,7 +28,7 @@ def call(program, words, samples):
 def without_arguments(name):
     """The name of a function without the arguments of its templates and of its call."""
     depth, plain = 0, ""
-    for character in name.replace("(anonymous namespace)::", "").replace("semblance::", ""):
+    for character in name:
         depth += (character in "<(") - (character in ">)")
         plain += character if depth == 0 and character not in ">)" else ""
     return plain.strip()
@@ -36,9 +36,9 @@ def without_arguments(name):
 
 def short(name):
     """The work of a thread appears as a lambda in a std::function; it is named after the function that holds it."""
-    name = re.sub(r" \[clone [^]]*\]", "", name).replace("::::", "::")
-    holder, lambda_, _ = name.partition("::{lambda")
-    return without_arguments(holder).split(", ")[-1] + (" (task)" if lambda_ else "")
+    name = re.sub(r" \[clone [^]]*\]|\(anonymous namespace\)", "", name).replace("::::", "::").replace("semblance::", "")
+    task = re.search(r"([\w:~]+)(\([^{]*\))?::\{lambda", name)
+    return task[1] + " (task)" if task else without_arguments(name).split(",")[0]
 
 
 def hottest(program, samples, count=10):
