@@ -24,8 +24,8 @@ class TriangleTree {
   // The mesh must have a triangle, and its points must be finite.
   explicit TriangleTree(const TriMesh& mesh);
 
-  // The triangle nearest to p. Of several at the same distance, bit by bit, the one of lowest
-  // index; so at a corner of several triangles.
+  // The triangle nearest to p. It takes the one with the lowest index if several have exactly the
+  // same distance, as at a corner.
   int Nearest(const Vec3& p) const;
 
   // The hits with `along` from 0 to 1, unordered. A ray in the plane of a triangle, or a triangle
@@ -45,9 +45,10 @@ class TriangleTree {
   // A box in single precision, rounded outwards: half the memory, and twice as many in the cache.
   struct Node {
     std::array<float, 3> low, high;
-    // Of the second part; the first one follows its parent. In a leaf: of the first triangle.
+    // Index of the second part's node; the first part follows its parent. A leaf has the index of
+    // its first triangle here.
     std::int32_t next = 0;
-    std::int32_t count = 0;  // of a leaf's triangles; 0: has parts
+    std::int32_t count = 0;  // number of a leaf's triangles; 0: the node has parts
 
     double SquaredDistance(const Vec3& p) const;
   };
