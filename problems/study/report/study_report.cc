@@ -307,9 +307,11 @@ SceneCollection Scenes(const StudyResults& results, const std::vector<Treatment>
     for (const Treatment& treatment : ranked) {
       for (const std::size_t n : treatment.trials) {
         const TrialRow& row = results.trials[n];
+        if (row.subject != subject || scenes.size() >= kLargestSceneCount) {
+          continue;
+        }
         const std::filesystem::path file = root / "trials" / row.id / "scene.json";
-        if (row.subject == subject && scenes.size() < kLargestSceneCount &&
-            std::filesystem::exists(file)) {
+        if (std::filesystem::exists(file)) {
           scenes.push_back({fmt::format("{} | {}", treatment.label, subject), ReadFileBytes(file)});
         }
       }
