@@ -384,6 +384,11 @@ std::vector<std::string> UnusedOptions(const Experiment& experiment) {
   std::vector<std::string> notes;
   if (std::holds_alternative<PriorThenFit>(face)) {
     notes = UnusedFitOptions(experiment);
+    if (std::holds_alternative<AutoFace>(experiment.face)) {
+      notes.push_back(
+          "face: `auto` is prior_then_fit here, because joint needs a plan of steps (listed or "
+          "coarse_to_fine) with `aim: surface`; write `face: prior_then_fit` if you want that");
+    }
   }
   for (const std::string& path : paths) {
     notes.push_back(fmt::format("{}: `face: {}` does not use it{}", path, NameOf(face),

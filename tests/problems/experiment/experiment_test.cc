@@ -96,6 +96,18 @@ TEST(Experiment, UnusedOptionsOfSeedsAndFitAreNoted) {
                   HasSubstr("first_fit: "), HasSubstr("fit.solver: "), HasSubstr("fit.terms: ")));
 }
 
+// The default method goes over to another one for some plans, which a user would not notice.
+TEST(Experiment, AnotherMethodThanJointIsNoted) {
+  const auto noted = [](const std::string& text) {
+    return UnusedOptions(ReadConfigText<Experiment>(text, "a.yaml"));
+  };
+  const auto has_note = Contains(HasSubstr("`auto` is prior_then_fit here"));
+  EXPECT_THAT(noted("fit: {plan: {type: adaptive, finest: 3}}\n"), has_note);
+  EXPECT_THAT(noted("face: prior_then_fit\nfit: {plan: {type: adaptive, finest: 3}}\n"),
+              Not(has_note));
+  EXPECT_THAT(noted(""), Not(has_note));
+}
+
 TEST(Experiment, AWidthWithoutALossIsNoted) {
   const auto unused = [](const std::string& face, const std::string& points) {
     return UnusedOptions(ReadConfigText<Experiment>(
