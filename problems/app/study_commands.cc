@@ -289,7 +289,7 @@ int CompareCommand(const StudyArguments& a) {
                      : a.better == "nearest" ? Better::kNearest
                                              : Better::kLower;
   }
-  const std::vector<NamedStudy> studies = ReadStudies({a.files.begin(), a.files.end()});
+  const std::vector<NamedStudy> studies = ReadStudies({a.files.begin(), a.files.end()}, a.metric);
   if (a.ranks) {
     if (studies.size() < 2) {
       throw InputError("--ranks compares the order of treatments in two studies; give two folders");

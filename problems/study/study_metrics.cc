@@ -285,7 +285,7 @@ std::string MetricsText(StudyJob job) {
 
 bool IsExpression(const std::string& metric) { return ReadExpression(metric) != nullptr; }
 
-double ComputeMetric(const std::map<std::string, double>& numbers, const std::string& metric) {
+double ComputeMetric(const NamedNumbers& numbers, const std::string& metric) {
   const auto number = [&](const std::string& name) {
     const auto found = numbers.find(name);
     return found == numbers.end() ? kNaN : found->second;
@@ -295,6 +295,11 @@ double ComputeMetric(const std::map<std::string, double>& numbers, const std::st
   }
   const std::unique_ptr<const NumberExpression> expression = ReadExpression(metric);
   return expression ? expression->Value(number) : kNaN;
+}
+
+std::vector<std::string> ListOperands(const std::string& metric) {
+  const std::unique_ptr<const NumberExpression> expression = ReadExpression(metric);
+  return expression ? expression->names() : std::vector{metric};
 }
 
 bool NeedsTrueSkin(const std::string& metric) {

@@ -3,13 +3,14 @@
 #pragma once
 
 #include <array>
-#include <map>
 #include <optional>
 #include <set>
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
+#include "problems/study/named_numbers.h"
 #include "problems/study/study_file.h"
 #include "problems/study/study_plugins.h"
 
@@ -32,7 +33,10 @@ std::string MetricsText(StudyJob job);
 bool IsExpression(const std::string& metric);
 
 // Computes the metric from the numbers of a trial, by dotted path. NaN if it lacks one of them.
-double ComputeMetric(const std::map<std::string, double>& numbers, const std::string& metric);
+double ComputeMetric(const NamedNumbers& numbers, const std::string& metric);
+
+// Lists the numbers that the metric is computed from: itself, or those of the expression.
+std::vector<std::string> ListOperands(const std::string& metric);
 
 // Returns true if the metric compares with the true skin, so that a subject without one lacks it.
 bool NeedsTrueSkin(const std::string& metric);

@@ -211,9 +211,11 @@ class StudyRunner {
   // which the hashes are compared by several threads.
   std::vector<StoredTrial> ReadStored(const std::vector<const StudyTrial*>& chosen) const {
     std::vector<StoredTrial> stored(chosen.size());
-    ParallelFor(
-        chosen.size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())), 1,
-        [&](std::size_t n) { stored[n] = ReadTrial(folder_, chosen[n]->id, TrialCheck::kAll); });
+    SharedNames none([](std::string_view) { return false; });
+    ParallelFor(chosen.size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())),
+                1, [&](std::size_t n) {
+                  stored[n] = ReadTrial(folder_, chosen[n]->id, TrialCheck::kAll, none);
+                });
     return stored;
   }
 
@@ -224,7 +226,9 @@ class StudyRunner {
     }
     if (stored.numbers && !MustRerun(*stored.numbers) &&
         HasKeptFiles(trial, stored.numbers->status)) {
-      UpdateAxes(trial);
+      if (!HasAxes(trial, *stored.numbers)) {
+        UpdateAxes(trial);
+      }
       ++summary_.skipped;
     } else {
       queue_.push_back(&trial);
@@ -251,19 +255,24 @@ class StudyRunner {
     return has_none || fs::exists(TrialFolder(folder_, trial.id) / file);
   }
 
+  // Returns true if the trial on disk has the subject and the axes of this plan.
+  bool HasAxes(const StudyTrial& trial, const TrialNumbers& stored) const {
+    std::vector<std::pair<std::string, std::string>> axes;
+    for (std::size_t k = 0; k < plan_.axes.size(); ++k) {
+      axes.emplace_back(plan_.axes[k], trial.values[k]);
+    }
+    return stored.subject == trial.subject && stored.axes == axes;
+  }
+
   // Replaces the axes of an earlier plan in trial.json by those of this plan.
   void UpdateAxes(const StudyTrial& trial) const {
     Json stored = *ReadTrialFile(folder_, trial.id);
     const Json head = TrialHead(plan_, trial);
-    bool is_changed = false;
     for (const auto& [key, value] : head.items()) {
-      is_changed = is_changed || !stored.contains(key) || stored[key] != value;
       stored[key] = value;
     }
-    if (is_changed) {
-      WriteFileAtomically(WritableTrialFolder(folder_, trial.id) / "trial.json",
-                          TrialText(std::move(stored), Maker::kAsBefore));
-    }
+    WriteFileAtomically(WritableTrialFolder(folder_, trial.id) / "trial.json",
+                        TrialText(std::move(stored), Maker::kAsBefore));
   }
 
   // Reports progress each second until all threads have ended.
@@ -503,19 +512,27 @@ bool IsChanged(const StoredPlan& stored, const StudyPlan& plan, const fs::path& 
   return changed;
 }
 
-// Checks the plans of all folders before anything is written.
-void RequireSamePlan(const fs::path& folder, const std::vector<fs::path>& others) {
-  std::string hash = ReadPlanHash(folder);
+// Checks the plans of all folders before anything is written, and returns the text of the plan.
+// Shards of one study have plans of the same bytes, which are parsed once.
+std::string RequireSamePlan(const fs::path& folder, const std::vector<fs::path>& others) {
+  std::string hash = ReadPlanHash(folder), text;
   for (const fs::path& other : others) {
+    std::string own_text =
+        fs::exists(other / "plan.json") ? ReadFileBytes(other / "plan.json") : "";
+    if (!text.empty() && own_text == text) {
+      continue;
+    }
     const std::string own = ReadPlanHash(other);
     if (own.empty() || (!hash.empty() && own != hash)) {
       throw IoError(
           fmt::format("{}: not a folder of this study (its plan.json is missing or different)",
                       other.string()));
     }
-    ReadStudyResults(other);
+    ReadStudyRows(other);
     hash = own;
+    text = std::move(own_text);
   }
+  return text;
 }
 
 }  // namespace
@@ -540,18 +557,20 @@ StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const Study
 }
 
 std::vector<std::string> GatherTrials(const fs::path& folder, const std::vector<fs::path>& others) {
-  RequireSamePlan(folder, others);
+  const std::string plan = RequireSamePlan(folder, others);
+  if (!others.empty()) {
+    OutputFolder(folder, WhenNotEmpty::kReplaceFiles).Write("plan.json", plan);
+  }
   std::vector<std::string> not_taken;
   for (const fs::path& other : others) {
-    OutputFolder output(folder, WhenNotEmpty::kReplaceFiles);
-    output.Write("plan.json", ReadFileBytes(other / "plan.json"));
     if (!fs::exists(other / "trials")) {
       continue;
     }
     for (const auto& entry : fs::directory_iterator(other / "trials")) {
       const std::string id = entry.path().filename().string();
+      SharedNames none([](std::string_view) { return false; });
       const bool is_there = fs::exists(entry.path() / "trial.json");
-      if (is_there && !ReadTrial(folder, id, TrialCheck::kAll).numbers) {
+      if (is_there && !ReadTrial(folder, id, TrialCheck::kAll, none).numbers) {
         if (const std::string fault = CopyTrial(other, folder, id); !fault.empty()) {
           not_taken.push_back(fmt::format("{}: not taken: {}", entry.path().string(), fault));
         }

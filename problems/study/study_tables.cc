@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
+#include <string_view>
 #include <thread>
 #include <utility>
 
@@ -58,8 +59,8 @@ std::string NameOtherMaker(const TrialNumbers& trial) {
                                               : "version " + trial.version;
 }
 
-void ReadTrial(const fs::path& folder, TrialCheck check, TrialRow& row) {
-  StoredTrial stored = ReadTrial(folder, row.id, check);
+void ReadTrial(const fs::path& folder, TrialCheck check, SharedNames& names, TrialRow& row) {
+  StoredTrial stored = ReadTrial(folder, row.id, check, names);
   row.status = stored.fault.empty() ? "missing" : "damaged";
   row.reason = std::move(stored.fault);
   if (!stored.numbers) {
@@ -74,12 +75,33 @@ void ReadTrial(const fs::path& folder, TrialCheck check, TrialRow& row) {
   TakeCurves(trial.lists, row);
 }
 
+// The part of a number's path before its last dot; empty without a dot.
+std::string_view GroupOf(std::string_view name) {
+  const std::size_t dot = name.rfind('.');
+  return name.substr(0, dot == name.npos ? 0 : dot);
+}
+
+// The numbers that a study keeps of each trial; see kMostTrialsInFull.
+SharedNames::Filter MakeFilter(std::size_t trials, const std::vector<std::string>& metrics) {
+  if (trials <= kMostTrialsInFull) {
+    return {};
+  }
+  std::set<std::string, std::less<>> groups;
+  for (const std::string& metric : metrics) {
+    for (const std::string& operand : ListOperands(metric)) {
+      groups.emplace(GroupOf(operand));
+    }
+  }
+  return [groups](std::string_view name) { return groups.contains(GroupOf(name)); };
+}
+
 // Reads all trials in parallel: a study has many, and reading them takes most of the time of its
 // tables.
-void ReadTrials(const fs::path& folder, TrialCheck check, std::vector<TrialRow>& rows) {
+void ReadTrials(const fs::path& folder, TrialCheck check, SharedNames& names,
+                std::vector<TrialRow>& rows) {
   constexpr std::size_t kBlock = 4;  // trials per task
   ParallelFor(rows.size(), static_cast<int>(std::max(1U, std::thread::hardware_concurrency())),
-              kBlock, [&](std::size_t n) { ReadTrial(folder, check, rows[n]); });
+              kBlock, [&](std::size_t n) { ReadTrial(folder, check, names, rows[n]); });
 }
 
 std::map<std::string, double> BySubject(const StudyResults& results, const Treatment& treatment,
@@ -96,11 +118,11 @@ std::map<std::string, double> BySubject(const StudyResults& results, const Treat
 
 // Collects the names of all metrics of all trials, sorted.
 std::set<std::string> CollectMetrics(const StudyResults& results) {
-  const auto name = [](const auto& metric) -> const std::string& { return metric.first; };
   std::set<std::string> metrics;
+  std::set<const std::vector<std::string>*> seen = {nullptr};  // most trials share their names
   for (const TrialRow& row : results.trials) {
-    if (!std::ranges::includes(metrics, row.metrics, {}, {}, name)) {  // most trials have the same
-      std::ranges::transform(row.metrics, std::inserter(metrics, metrics.end()), name);
+    if (seen.insert(row.metrics.names()).second) {
+      metrics.insert(row.metrics.names()->begin(), row.metrics.names()->end());
     }
   }
   return metrics;
@@ -155,7 +177,7 @@ bool StudyResults::HasMetric() const {
   });
 }
 
-StudyResults ReadStudyResults(const fs::path& folder, TrialCheck check) {
+StudyResults ReadStudyRows(const fs::path& folder) {
   const fs::path file = folder / "plan.json";
   const auto fail = [&file] {
     return IoError(fmt::format(
@@ -176,12 +198,26 @@ StudyResults ReadStudyResults(const fs::path& folder, TrialCheck check) {
         throw fail();
       }
     }
-    ReadTrials(folder, check, results.trials);
-    AddExpression(results);
     results.tags = plan.value("tags", std::vector<std::string>());
     results.preference = PreferenceFor(results.metric);
   } catch (const nlohmann::json::exception&) {
     throw fail();
+  }
+  return results;
+}
+
+StudyResults ReadStudyResults(const fs::path& folder, TrialCheck check,
+                              const std::string& further) {
+  StudyResults results = ReadStudyRows(folder);
+  SharedNames names(MakeFilter(results.trials.size(),
+                               {results.metric, further.empty() ? results.metric : further}));
+  ReadTrials(folder, check, names, results.trials);
+  AddExpression(results);
+  if (results.trials.size() > kMostTrialsInFull) {
+    results.notes.push_back(fmt::format(
+        "the study has more than {} trials, so its tables hold the numbers beside the metric alone "
+        "(of the group {}); trial.json of each trial has all",
+        kMostTrialsInFull, GroupOf(ListOperands(results.metric).front())));
   }
   std::ranges::copy(VersionNotes(results), std::back_inserter(results.notes));
   std::ranges::copy(AreaNotes(results), std::back_inserter(results.notes));
@@ -364,7 +400,7 @@ class MetricWalk {
 
  private:
   const StudyResults& results_;
-  std::vector<std::map<std::string, double>::const_iterator> next_;  // per trial
+  std::vector<NamedNumbers::Iterator> next_;  // per trial
 };
 
 }  // namespace

@@ -19,7 +19,7 @@ struct TrialRow {
   std::vector<std::string> values;        // one per axis
   std::string status;                     // done, unusable, failed, damaged, missing
   std::string reason;                     // why it failed, or is unusable or damaged
-  std::map<std::string, double> metrics;  // by dotted path in result.json; finite ones only
+  NamedNumbers metrics;                   // by dotted path in result.json; finite ones only
   std::vector<double> quantiles_mm = {};  // of the face's error (FaceMetrics); empty: none
   std::vector<double> step_rms_mm = {};   // before the first step of the fit, after each
   // Calibration of the stated standard deviations (interp/evaluation/calibration.h): shares within
@@ -47,10 +47,21 @@ struct StudyResults {
   bool HasMetric() const;
 };
 
+// A study of more trials keeps, of the numbers of each trial, only those of the groups of its
+// metric (for face.rms_mm: face.rms_mm, face.median_mm and so on), with a note. All numbers of
+// 100,000 trials would take tables of several gigabytes.
+inline constexpr std::size_t kMostTrialsInFull = 5000;
+
+// Reads the plan of a study's folder: its trials, without their status and numbers. Throws IoError
+// if plan.json is missing or is not the plan of a study.
+StudyResults ReadStudyRows(const std::filesystem::path& folder);
+
 // Reads a study's folder. A trial that is not sound (trial_folder.h) is `damaged` and has no
-// numbers. Throws IoError if plan.json is missing or is not the plan of a study.
+// numbers. `further` is another metric that is kept in a large study; it may be empty. Throws
+// IoError as ReadStudyRows.
 StudyResults ReadStudyResults(const std::filesystem::path& folder,
-                              TrialCheck check = TrialCheck::kSizes);
+                              TrialCheck check = TrialCheck::kSizes,
+                              const std::string& further = {});
 
 // Returns notes on trials that this program did not make, one line per version: "4 of 6 trials were
 // made by version 0.0.1 ...". Such numbers may differ for another reason than the treatments.

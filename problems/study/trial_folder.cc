@@ -16,7 +16,6 @@
 #include "problems/io/staged_folder.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/geometry.h"
 #include "surfaces/base/json_text.h"
 
 namespace semblance::problems {
@@ -53,20 +52,28 @@ std::string ThisBuild() {
   return ProgramHash().substr(0, kDigits);
 }
 
+bool IsBlank(char c) { return c == ' ' || c == '\n' || c == '\r' || c == '\t'; }
+
+// Returns the place after the text in quotes that begins at `at`.
+std::size_t FindTextEnd(std::string_view json, std::size_t at) {
+  for (++at; at < json.size() && json[at] != '"'; ++at) {
+    at += json[at] == '\\' ? 1 : 0;
+  }
+  return std::min(at + 1, json.size());
+}
+
 // JSON without the blanks between its tokens, so that a program that writes the same members in
 // other lines keeps the hash.
 std::string WithoutBlanks(std::string_view json) {
   std::string bare;
-  bool in_text = false;
-  for (std::size_t k = 0; k < json.size(); ++k) {
-    const char c = json[k];
-    if (in_text && c == '\\' && k + 1 < json.size()) {
-      bare.append(json.substr(k++, 2));
-      continue;
+  bare.reserve(json.size());
+  for (std::size_t begin = 0, at = 0; at < json.size(); begin = at) {
+    while (at < json.size() && !IsBlank(json[at])) {
+      at = json[at] == '"' ? FindTextEnd(json, at) : at + 1;
     }
-    in_text ^= c == '"';
-    if (in_text || (c != ' ' && c != '\n' && c != '\r' && c != '\t')) {
-      bare += c;
+    bare.append(json.substr(begin, at - begin));
+    while (at < json.size() && IsBlank(json[at])) {
+      ++at;
     }
   }
   return bare;
@@ -173,101 +180,6 @@ std::string ListFiles(const fs::path& trial, std::vector<fs::path>& files) {
   return "";
 }
 
-// Collects TrialNumbers during the parse of a trial.json. A member that returns false ends the
-// parse.
-class TrialHandler : public nlohmann::json_sax<Json> {
- public:
-  TrialNumbers TakeNumbers() { return std::move(trial_); }
-
-  bool null() override { return lists_open_ > 0 ? Number(kNaN) : IsInObject() && IsNotText(); }
-  bool boolean(bool) override { return IsInObject() && IsNotText(); }
-  bool number_integer(number_integer_t value) override {
-    return Number(static_cast<double>(value));
-  }
-  bool number_unsigned(number_unsigned_t value) override {
-    return Number(static_cast<double>(value));
-  }
-  bool number_float(number_float_t value, const string_t&) override { return Number(value); }
-  bool binary(binary_t&) override { return false; }
-
-  bool string(string_t& value) override {
-    if (std::string* place = TextPlace()) {
-      *place = std::move(value);
-    } else if (path_ == "files.file") {
-      trial_.files.emplace_back().name = std::move(value);
-    } else if (path_ == "files.sha256" && !trial_.files.empty()) {
-      trial_.files.back().sha256 = std::move(value);
-    }
-    return IsInObject();
-  }
-  bool key(string_t& name) override {
-    path_.resize(path_lengths_.back());
-    path_ += (path_.empty() ? "" : ".") + name;
-    return true;
-  }
-
-  bool start_object(std::size_t) override {
-    const bool go_on = IsNotText();
-    path_lengths_.push_back(path_.size());
-    return go_on;
-  }
-  bool end_object() override { return End(); }
-  bool start_array(std::size_t) override {
-    ++lists_open_;
-    const bool go_on = IsInObject() && IsNotText();
-    path_lengths_.push_back(path_.size());
-    return go_on;
-  }
-  bool end_array() override {
-    --lists_open_;
-    return End();
-  }
-
-  bool parse_error(std::size_t, const std::string&, const nlohmann::detail::exception&) override {
-    return false;
-  }
-
- private:
-  // Returns the place for the text at the current path, or null if that text is not kept.
-  std::string* TextPlace() {
-    return path_lengths_.size() != 1 ? nullptr
-           : path_ == "id"           ? &trial_.id
-           : path_ == "status"       ? &trial_.status
-           : path_ == "reason"       ? &trial_.reason
-           : path_ == "version"      ? &trial_.version
-           : path_ == "program"      ? &trial_.program
-                                     : nullptr;
-  }
-  bool IsInObject() const { return !path_lengths_.empty(); }  // trial.json itself is an object
-  bool IsNotText() { return TextPlace() == nullptr; }
-
-  bool Number(double value) {
-    constexpr std::string_view kResult = "result.";
-    if (path_.starts_with(kResult)) {
-      if (lists_open_ > 0) {
-        trial_.lists[path_.substr(kResult.size())].push_back(value);
-      } else {
-        trial_.metrics[path_.substr(kResult.size())] = value;
-      }
-    } else if (path_ == "files.bytes" && !trial_.files.empty()) {
-      trial_.files.back().bytes = value;
-    }
-    return IsInObject() && IsNotText();
-  }
-
-  bool End() {
-    path_.resize(path_lengths_.back());
-    path_lengths_.pop_back();
-    return true;
-  }
-
-  TrialNumbers trial_;
-  std::string path_;  // path of the next value
-  std::vector<std::size_t>
-      path_lengths_;  // length of path_ at the start of each open list or object
-  int lists_open_ = 0;
-};
-
 }  // namespace
 
 fs::path TrialFolder(const fs::path& study, const std::string& id) { return study / "trials" / id; }
@@ -305,7 +217,8 @@ std::string TrialText(Json json, Maker maker) {
   return json.dump(1) + "\n";
 }
 
-StoredTrial ReadTrial(const fs::path& study, const std::string& id, TrialCheck check) {
+StoredTrial ReadTrial(const fs::path& study, const std::string& id, TrialCheck check,
+                      SharedNames& names) {
   const fs::path file = TrialFolder(study, id) / kTrialFile;
   if (!FileExists(file)) {
     return {};
@@ -313,7 +226,7 @@ StoredTrial ReadTrial(const fs::path& study, const std::string& id, TrialCheck c
   StoredTrial stored;
   try {
     const std::string text = ReadFileBytes(file);
-    std::optional<TrialNumbers> numbers = ReadTrialNumbers(text);
+    std::optional<TrialNumbers> numbers = ReadTrialNumbers(text, names);
     stored.fault = !numbers                              ? "trial.json cannot be read"
                    : numbers->id != id                   ? "trial.json is of another trial"
                    : !HasOwnHash(text, numbers->version) ? "trial.json is not what was written"
@@ -331,8 +244,8 @@ StoredTrial ReadTrial(const fs::path& study, const std::string& id, TrialCheck c
 }
 
 std::optional<Json> ReadTrialFile(const fs::path& study, const std::string& id) {
-  constexpr TrialCheck kFast = TrialCheck::kSizes;
-  return ReadTrial(study, id, kFast).numbers
+  SharedNames none([](std::string_view) { return false; });
+  return ReadTrial(study, id, TrialCheck::kSizes, none).numbers
              ? std::optional(ParsedOrNull(TrialFolder(study, id) / kTrialFile))
              : std::nullopt;
 }
@@ -378,7 +291,8 @@ std::string CopyTrial(const fs::path& from, const fs::path& to, const std::strin
   }
   std::vector<fs::path> files;
   std::string fault = ListFiles(trial, files);
-  fault = fault.empty() ? ReadTrial(from, id, TrialCheck::kAll).fault : fault;
+  SharedNames none([](std::string_view) { return false; });
+  fault = fault.empty() ? ReadTrial(from, id, TrialCheck::kAll, none).fault : fault;
   fault = fault.empty() ? FindManifestFault(trial) : fault;
   if (!fault.empty()) {
     return fault;
@@ -389,16 +303,6 @@ std::string CopyTrial(const fs::path& from, const fs::path& to, const std::strin
   }
   copy.Publish(Durability::kUnsynced);  // what a power failure takes can be copied again
   return "";
-}
-
-std::optional<TrialNumbers> ReadTrialNumbers(std::string_view text) {
-  try {
-    CheckJsonDepth(text);
-  } catch (const IoError&) {
-    return std::nullopt;
-  }
-  TrialHandler handler;
-  return Json::sax_parse(text, &handler) ? std::optional(handler.TakeNumbers()) : std::nullopt;
 }
 
 }  // namespace semblance::problems

@@ -5,14 +5,13 @@
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "surfaces/base/geometry.h"
+#include "problems/study/trial_numbers.h"
 
 namespace semblance::problems {
 
@@ -49,31 +48,8 @@ std::string ReadPlanHash(const std::filesystem::path& study);
 nlohmann::ordered_json ListHashes(const std::filesystem::path& trial,
                                   const std::vector<std::string>& names);
 
-// A file of a trial, as trial.json lists it.
-struct TrialFile {
-  std::string name;
-  double bytes = kNaN;  // NaN in a trial of an older version
-  std::string sha256;
-};
-
-// The parts of a trial.json that the tables of a study need. They are read from the text without a
-// JSON tree, because a study has thousands of trials with hundreds of numbers each.
-struct TrialNumbers {
-  std::string id, status = "failed", reason;
-  std::string version, program;           // that made it
-  std::map<std::string, double> metrics;  // numbers of `result` by dotted path
-  // The numbers in lists of `result`, in their order; a list of objects gives one list per member;
-  // null becomes NaN.
-  std::map<std::string, std::vector<double>> lists;
-  std::vector<TrialFile> files;
-};
-
 // Returns true if this version and this build of the program made the trial.
 bool IsOfThisProgram(const TrialNumbers& trial);
-
-// Returns nothing if the text is not a JSON object, is nested deeper than kDeepestJson, or has an
-// id, status, reason or version that is not a text.
-std::optional<TrialNumbers> ReadTrialNumbers(std::string_view text);
 
 // The files of a trial of which the bytes are compared with trial.json's hashes: none, only their
 // sizes; those that a report shows; all.
@@ -84,7 +60,9 @@ struct StoredTrial {
   std::optional<TrialNumbers> numbers;  // of a sound trial
   std::string fault;                    // the reason why it is not sound
 };
-StoredTrial ReadTrial(const std::filesystem::path& study, const std::string& id, TrialCheck check);
+// `names` keeps or drops numbers and serves all trials of the study.
+StoredTrial ReadTrial(const std::filesystem::path& study, const std::string& id, TrialCheck check,
+                      SharedNames& names);
 
 // Copies a sound trial to another study's folder, completely or not at all, trial.json last.
 // Returns "", or the reason why it was not copied: a fault of ReadTrial, a file that manifest.json

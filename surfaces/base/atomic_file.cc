@@ -14,6 +14,7 @@
 #include <fstream>
 #include <list>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -147,6 +148,29 @@ void AppendRest(std::ifstream& file, const fs::path& path, std::string& bytes) {
   }
 }
 
+// Reads a regular file with few calls of the system, because a study reads hundreds of thousands of
+// small ones. Returns nothing for anything else, without opening it: a pipe can be opened only
+// once.
+std::optional<std::string> ReadRegularFile(const fs::path& path) {
+  struct stat state {};
+  if (::stat(path.c_str(), &state) != 0 || !S_ISREG(state.st_mode)) {
+    return std::nullopt;
+  }
+  std::string bytes(static_cast<std::size_t>(state.st_size) + 1, '\0');  // one more finds the end
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  std::size_t size = 0;
+  ssize_t more = descriptor < 0 ? -1 : 1;
+  while (more > 0 && size < bytes.size()) {
+    more = ::read(descriptor, bytes.data() + size, bytes.size() - size);
+    size += more > 0 ? static_cast<std::size_t>(more) : 0;
+  }
+  if (descriptor >= 0) {
+    ::close(descriptor);
+  }
+  bytes.resize(size);
+  return more == 0 ? std::optional(std::move(bytes)) : std::nullopt;
+}
+
 void RefuseFolder(const fs::path& path) {
   std::error_code ignored;
   if (fs::is_directory(path, ignored)) {
@@ -250,12 +274,15 @@ void NewFolders::Remove() {
 }
 
 std::string ReadFileBytes(const fs::path& path) {
-  std::error_code error;
-  if (!fs::exists(path, error) && !error) {
-    throw IoError(fmt::format("{}: no such file", path.string()));
-  }
-  RefuseFolder(path);
   try {
+    if (std::optional<std::string> bytes = ReadRegularFile(path)) {
+      return *std::move(bytes);
+    }
+    std::error_code error;
+    if (!fs::exists(path, error) && !error) {
+      throw IoError(fmt::format("{}: no such file", path.string()));
+    }
+    RefuseFolder(path);
     return ReadBytes(path);
   } catch (const std::bad_alloc&) {
     FailTooLarge(path);

@@ -21,11 +21,15 @@ double Rounded(double x) { return std::round(x * 1e9) / 1e9; }
 
 constexpr std::size_t kResamples = 4000;
 
+// Draws resample by resample. The first indices of all resamples come first, then the second ones
+// and so on, so that BootstrapMean can add to all sums at once.
 std::vector<std::uint32_t> DrawResamples(std::size_t size, std::uint64_t random_seed) {
   Random random(random_seed);
   std::vector<std::uint32_t> indices(kResamples * size);
-  for (std::uint32_t& index : indices) {
-    index = static_cast<std::uint32_t>(random.Index(size));
+  for (std::size_t k = 0; k < kResamples; ++k) {
+    for (std::size_t n = 0; n < size; ++n) {
+      indices[n * kResamples + k] = static_cast<std::uint32_t>(random.Index(size));
+    }
   }
   return indices;
 }
@@ -48,16 +52,18 @@ const std::vector<std::uint32_t>& ResampleIndices(std::size_t size, std::uint64_
 
 Interval BootstrapMean(std::span<const double> values, std::uint64_t random_seed) {
   const std::vector<std::uint32_t>& indices = ResampleIndices(values.size(), random_seed);
-  std::vector<double> means(kResamples);
-  for (std::size_t k = 0; k < kResamples; ++k) {
-    double sum = 0;
-    for (std::size_t n = 0; n < values.size(); ++n) {
-      sum += values[indices[k * values.size() + n]];
+  std::vector<double> means(kResamples, 0.0);
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    const std::uint32_t* const drawn = indices.data() + n * kResamples;
+    for (std::size_t k = 0; k < kResamples; ++k) {
+      means[k] += values[drawn[k]];
     }
-    means[k] = sum / static_cast<double>(values.size());
   }
-  const std::vector<WeightedValue> sorted = SortedValues(means);
-  return {Quantile(sorted, 0.025), Quantile(sorted, 0.975)};
+  for (double& mean : means) {
+    mean /= static_cast<double>(values.size());
+  }
+  const double low = Quantile(means, 0.025);
+  return {low, Quantile(means, 0.975)};
 }
 
 // Mean ranks from 1, smallest first.

@@ -246,7 +246,8 @@ std::vector<std::string> PairNotes(const StudyComparison& comparison) {
 
 }  // namespace
 
-std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders) {
+std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders,
+                                    const std::string& metric) {
   std::vector<fs::path> real;
   for (const fs::path& folder : folders) {
     std::error_code ignored;
@@ -260,7 +261,8 @@ std::vector<NamedStudy> ReadStudies(const std::vector<fs::path>& folders) {
   const std::vector<std::string> names = ShortNames(real);
   std::vector<NamedStudy> studies;
   for (std::size_t k = 0; k < real.size(); ++k) {
-    studies.push_back({names[k], ReadStudyResults(folders[k]), folders[k]});
+    studies.push_back(
+        {names[k], ReadStudyResults(folders[k], TrialCheck::kSizes, metric), folders[k]});
     if (const std::string damaged = DamageText(studies.back().results); !damaged.empty()) {
       throw IoError(fmt::format("{}: {}", folders[k].string(), damaged));
     }

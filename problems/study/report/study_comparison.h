@@ -22,9 +22,10 @@ struct NamedStudy {
 };
 
 // The results in each folder. A study is named by its folder, and by more of the path if two
-// folders have the same name. Throws IoError as ReadStudyResults and for a damaged trial, and
-// InputError if a folder appears twice.
-std::vector<NamedStudy> ReadStudies(const std::vector<std::filesystem::path>& folders);
+// folders have the same name. `metric` is the number to compare; empty: that of each study. Throws
+// IoError as ReadStudyResults and for a damaged trial, and InputError if a folder appears twice.
+std::vector<NamedStudy> ReadStudies(const std::vector<std::filesystem::path>& folders,
+                                    const std::string& metric = {});
 
 // A treatment of one study, over the subjects that all studies have.
 struct ComparedTreatment {

@@ -50,7 +50,7 @@ ReportTable RankingTable(const StudyResults& results, const std::vector<Treatmen
                  treatment.unusable, s.mean, IntervalText(s.mean_95), s.sd, s.median, s.min, s.max,
                  TableNumber(MeanSeconds(results, treatment), 1));
     table.links.push_back(
-        treatment.trials.empty() ? "" : "#" + TrialAnchor(results.trials[treatment.trials[0]]));
+        treatment.trials.empty() ? "" : TrialHref(results, results.trials[treatment.trials[0]]));
   }
   return table;
 }
@@ -172,9 +172,14 @@ std::string TrialLink(const TrialRow& row, const std::filesystem::path& root) {
 }
 
 ReportSection TrialsSection(const StudyResults& results, const std::filesystem::path& root) {
-  ReportTable table{fmt::format("Every trial, with {}", WordsOfMetric(results.metric)),
+  const bool lists_all = results.trials.size() <= kMostListedTrials;
+  ReportTable table{fmt::format("{} trial, with {}", lists_all ? "Every" : "Each such",
+                                WordsOfMetric(results.metric)),
                     {"trial", "subject", "treatment", "status", "value", "seconds", "reason"}};
   for (const TrialRow& row : results.trials) {
+    if (!lists_all && (row.status == "done" || table.rows.size() == kMostListedTrials)) {
+      continue;
+    }
     const auto value = row.metrics.find(results.metric);
     table.AddRow(row.id, row.subject, TreatmentLabel(results.axes, row.values), row.status,
                  value == row.metrics.end() ? kNaN : value->second, TableNumber(row.wall_s, 1),
@@ -182,7 +187,15 @@ ReportSection TrialsSection(const StudyResults& results, const std::filesystem::
     table.ids.push_back(TrialAnchor(row));
     table.links.push_back(TrialLink(row, root));
   }
-  return {.heading = "Trials", .tables = {table}, .folded = true};
+  ReportSection section{.heading = "Trials", .folded = true};
+  if (!lists_all) {
+    section.paragraphs = {fmt::format(
+        "To keep this file small, only trials that are not done are listed here, at most {}. "
+        "trials_wide.csv lists all {}.",
+        kMostListedTrials, results.trials.size())};
+  }
+  section.tables = WithoutEmptyTables({std::move(table)});
+  return section;
 }
 
 // The mean of one curve over subjects, point by point, one row per treatment. Subjects whose curve

@@ -79,7 +79,7 @@ std::string LinkTo(const StudyResults& results, const Treatment& treatment,
                    const std::string& subject) {
   for (const std::size_t n : treatment.trials) {
     if (results.trials[n].subject == subject) {
-      return "#" + TrialAnchor(results.trials[n]);
+      return TrialHref(results, results.trials[n]);
     }
   }
   return "";
@@ -88,6 +88,11 @@ std::string LinkTo(const StudyResults& results, const Treatment& treatment,
 }  // namespace
 
 std::string TrialAnchor(const TrialRow& row) { return "t-" + row.id; }
+
+std::string TrialHref(const StudyResults& results, const TrialRow& row) {
+  return results.trials.size() <= kMostListedTrials ? "#" + TrialAnchor(row)
+                                                    : fmt::format("trials/{}/trial.json", row.id);
+}
 
 std::vector<ReportImage> AxisPlots(const StudyResults& results,
                                    const std::vector<Treatment>& ranked) {

@@ -20,8 +20,15 @@ std::vector<ReportImage> AxisPlots(const StudyResults& results,
 std::vector<ReportImage> SubjectMap(const StudyResults& results,
                                     const std::vector<Treatment>& ranked);
 
+// A larger study lists only the trials that are not done, so that browsers still open its report.
+inline constexpr std::size_t kMostListedTrials = 10'000;
+
 // The HTML id of a trial's row.
 std::string TrialAnchor(const TrialRow& row);
+
+// Returns the link of a trial: to its row, or in a study of more than kMostListedTrials to its
+// trial.json.
+std::string TrialHref(const StudyResults& results, const TrialRow& row);
 
 // Tables with one row per treatment, in the order given, and means over subjects. A table without
 // numbers is left out:

@@ -270,6 +270,26 @@ TEST_F(StudyTest, TheMetricsOfARunAreKnownBeforeIt) {
   }
 }
 
+// A study of many trials keeps the numbers beside its metric, and those beside another on request.
+TEST_F(StudyTest, ALargeStudyKeepsTheNumbersBesideItsMetric) {
+  RunStudy(Plan("grid: {rounds: [1]}\n"), folder_ / "run", {}, {});
+  const std::size_t all = ReadStudyResults(folder_ / "run").trials[0].metrics.size();
+  auto plan = nlohmann::ordered_json::parse(ReadFileBytes(folder_ / "run/plan.json"));
+  for (std::size_t n = plan["trials"].size(); n <= kMostTrialsInFull; ++n) {
+    plan["trials"].push_back(plan["trials"][0]);
+    plan["trials"].back()["id"] = fmt::format("{:012}", n);
+  }
+  WriteFileAtomically(folder_ / "run/plan.json", plan.dump());
+  const StudyResults results = ReadStudyResults(folder_ / "run");
+  EXPECT_THAT(results.notes, ::testing::Contains(HasSubstr("of the group face)")));
+  EXPECT_LT(results.trials[0].metrics.size(), all);
+  EXPECT_TRUE(results.trials[0].metrics.contains("face.median_mm"));
+  EXPECT_FALSE(results.trials[0].metrics.contains("fit.dowel_rms_mm"));
+  EXPECT_TRUE(ReadStudyResults(folder_ / "run", TrialCheck::kSizes, "fit.dowel_rms_mm")
+                  .trials[0]
+                  .metrics.contains("fit.dowel_rms_mm"));
+}
+
 TEST_F(StudyTest, DifferentAreasAreReported) {
   RunStudy(Plan("grid: {region.extent: [face, network]}\n"), folder_ / "unlike", {}, {});
   EXPECT_THAT(StudyFiles(folder_ / "unlike").at("report.html"),

@@ -46,7 +46,8 @@ class TrialFolders : public ::testing::Test {
     Write("trial.json", TrialText(json, Maker::kThisProgram));
   }
   StoredTrial Read(TrialCheck check = TrialCheck::kAll) const {
-    return ReadTrial(folder_ / "from", "a", check);
+    SharedNames names;
+    return ReadTrial(folder_ / "from", "a", check, names);
   }
   std::string Copy() const { return CopyTrial(folder_ / "from", folder_ / "to", "a"); }
   // The copy is refused and writes nothing.
@@ -217,24 +218,69 @@ void AddNumbers(const Json& json, const std::string& path, std::map<std::string,
   }
 }
 
+std::optional<TrialNumbers> Numbers(const std::string& text) {
+  SharedNames names;
+  return ReadTrialNumbers(text, names);
+}
+
 TEST(TrialNumbers, EqualThoseOfTheTree) {
   const std::string text = R"({"id": "a1", "status": "done", "axes": {"x": "1", "status": "no"},
     "result": {"n": 3, "low": -2, "null": null, "text": "x", "flag": true, "face":
     {"rms_mm": 1.5, "quantiles_mm": [0.5, null, 1e-3], "id": "b"},
     "fit": {"levels": [{"rms": 3, "deep": {"d": [7]}}, {"rms": 2}], "after": 1}, "last": 4e2},
     "files": [{"file": "a", "size": 4}], "after": 5})";
-  const auto trial = ReadTrialNumbers(text);
+  const auto trial = Numbers(text);
   ASSERT_TRUE(trial);
   EXPECT_EQ(trial->id, "a1");
   EXPECT_EQ(trial->status, "done");
   std::map<std::string, double> numbers;
   AddNumbers(Json::parse(text)["result"], "", numbers);
-  EXPECT_EQ(trial->metrics, numbers);
+  EXPECT_EQ((std::map<std::string, double>(trial->metrics.begin(), trial->metrics.end())), numbers);
   EXPECT_EQ(trial->metrics.size(), 5U);
   EXPECT_THAT(trial->lists,
               ElementsAre(Pair("face.quantiles_mm", ElementsAre(0.5, ::testing::IsNan(), 1e-3)),
                           Pair("fit.levels.deep.d", ElementsAre(7)),
                           Pair("fit.levels.rms", ElementsAre(3, 2))));
+}
+
+TEST(TrialNumbers, AgreeWithAJsonLibrary) {
+  for (const char* value : {"1",      "-0",          "0.1",
+                            "1e5",    "1E-5",        "-1.5e+300",
+                            "1e-400", "4.9e-324",    "123456789012345678901",
+                            "1e400",  "01",          "1.",
+                            ".5",     "+1",          "-",
+                            "1e",     "1e+",         "tru",
+                            "nul",    "true",        "null",
+                            "\"a\"",  "\"\\u00e9\"", "\"\\x\"",
+                            "\"\t\"", "\"\xff\"",    "\"\xc3\xa9\"",
+                            "[1, 2]", "[1 2]",       "[1,]",
+                            "[,1]",   "{\"b\": 1}",  "{\"b\": 1,}",
+                            "{b: 1}", "{\"b\" 1}",   "",
+                            "1 2"}) {
+    const std::string text = std::string(R"({"result": {"a": )") + value + "}}";
+    EXPECT_EQ(Numbers(text).has_value(), Json::accept(text)) << text;
+    if (const auto trial = Numbers(text); trial && trial->metrics.contains("a")) {
+      EXPECT_EQ(trial->metrics.at("a"), Json::parse(text)["result"]["a"].get<double>()) << text;
+    }
+  }
+}
+
+TEST(TrialNumbers, OfOneKindShareTheirNames) {
+  SharedNames names([](std::string_view name) { return name != "b"; });
+  const auto first = ReadTrialNumbers(R"({"result": {"c": 1, "b": 2, "a": 3}})", names);
+  const auto second = ReadTrialNumbers(R"({"result": {"c": 4, "b": 5, "a": 6}})", names);
+  const auto other = ReadTrialNumbers(R"({"result": {"a": 7, "a": 8}})", names);
+  EXPECT_EQ(first->metrics.names(), second->metrics.names());
+  EXPECT_THAT(*first->metrics.names(), ElementsAre("a", "c"));
+  EXPECT_EQ(second->metrics.at("a"), 6);
+  EXPECT_EQ(other->metrics.at("a"), 8);
+  EXPECT_EQ(other->metrics.size(), 1U);
+}
+
+TEST(TrialNumbers, HaveTheAxes) {
+  const auto trial = Numbers(R"({"subject": "s", "axes": {"interp.type": "mean", "b": ""}})");
+  EXPECT_EQ(trial->subject, "s");
+  EXPECT_THAT(trial->axes, ElementsAre(Pair("interp.type", "mean"), Pair("b", "")));
 }
 
 TEST(TrialNumbers, AreMissingForATextThatIsNotATrial) {
@@ -245,9 +291,9 @@ TEST(TrialNumbers, AreMissingForATextThatIsNotATrial) {
         std::string("\"id\""), std::string(R"({"id": "a")"), std::string(R"({"id": 1})"),
         std::string(R"({"id": null})"), std::string(R"({"status": ["done"]})"),
         std::string(R"({"status": {"a": 1}})"), std::string(R"({"reason": false})"), deep}) {
-    EXPECT_FALSE(ReadTrialNumbers(text)) << text;
+    EXPECT_FALSE(Numbers(text)) << text;
   }
-  EXPECT_EQ(ReadTrialNumbers("{}")->status, "failed");
+  EXPECT_EQ(Numbers("{}")->status, "failed");
 }
 
 }  // namespace
