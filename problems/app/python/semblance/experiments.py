@@ -4,7 +4,7 @@ import csv
 import json
 import os
 import pathlib
-
+import warnings
 
 from . import _semblance
 from .errors import InputError
@@ -86,7 +86,7 @@ def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "")
     Returns
     -------
     pandas.DataFrame or list of dict
-        trials.csv in long form; a DataFrame if pandas is installed.
+        trials.csv in long form; a DataFrame if pandas is installed. A warning counts the trials that failed in this call.
     """
     if os.path.isdir(path):
         if out is not None:
@@ -94,7 +94,9 @@ def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "")
         _semblance.check_study_folder(os.fspath(path))
         return _table(pathlib.Path(path) / "trials.csv")
     out = pathlib.Path("out", pathlib.Path(path).stem) if out is None else pathlib.Path(out)
-    run_study(path, out, jobs, (0, 1), only, schemes, metrics)
+    counts = run_study(path, out, jobs, (0, 1), only, schemes, metrics)
+    if counts["failed"]:
+        warnings.warn(f"{counts['failed']} of {counts['trials']} trials failed; the table's column 'reason' states why", stacklevel=2)
     return _table(out / "trials.csv")
 
 

@@ -80,7 +80,8 @@ class Study(unittest.TestCase):
 
     def test_an_exception_fails_only_its_trial_and_keeps_the_traceback(self):
         self.write(PLUGIN, "mine.py")
-        table = semblance.study(self.study("{type: level, fail: true}, level", "plugins: [mine.py]\n"), self.root / "out")
+        with self.assertWarnsRegex(UserWarning, "1 of 2 trials failed"):
+            table = semblance.study(self.study("{type: level, fail: true}, level", "plugins: [mine.py]\n"), self.root / "out")
         rows = table if isinstance(table, list) else table.to_dict("records")
         status = {row["interp"]: (row["status"], row["trial"]) for row in rows}
         self.assertEqual(status["level"][0], "done")
@@ -136,6 +137,13 @@ class Laws(unittest.TestCase):
         check_scheme(shepard)
         self.assertEqual(list(inspect.signature(shepard).parameters), ["given", "power"])
         check_scheme(semblance.scheme("middle")(lambda given: np.full(len(given.vertices), given.depths_mm.mean())), exact=False)
+
+    def test_a_scheme_that_jumps_may_obey_them(self):
+        def nearest3(given):
+            distance = np.linalg.norm(given.vertices[:, None] - given.bases, axis=2)
+            return given.depths_mm[np.argsort(distance, axis=1)[:, :3]].mean(axis=1)
+
+        check_scheme(semblance.scheme("nearest3")(nearest3), exact=False)
 
     def test_a_broken_law_is_named(self):
         broken = {"order of the markers": lambda given: np.full(len(given.vertices), given.depths_mm[0]),
