@@ -4,9 +4,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
 #include <string>
 #include <vector>
 
@@ -21,7 +19,6 @@
 #include "problems/study/report/study_ranking.h"
 #include "problems/study/report/study_sections.h"
 #include "problems/study/trial_folder.h"
-#include "surfaces/base/parallel.h"
 
 namespace semblance::problems {
 namespace {
@@ -486,23 +483,12 @@ std::string StudyReportHtml(const StudyResults& results, const std::filesystem::
 
 StudyResults WriteStudyTables(OutputFolder& folder) {
   StudyResults results = ReadStudyResults(folder.Root(), TrialCheck::kShown);
-  struct Table {
-    const char* name;
-    std::function<std::string()> text_of;
-    std::string text = "";
-  };
-  std::array tables = {
-      Table{"trials.csv", [&] { return TrialsCsv(results); }},
-      Table{"trials_wide.csv", [&] { return TrialsWideCsv(results); }},
-      Table{"summary.csv", [&] { return SummaryCsv(results); }},
-      Table{"results.sqlite", [&] { return ResultsSqlite(results); }},
-      Table{"report.html", [&] { return StudyReportHtml(results, folder.Root()); }},
-  };
-  ParallelFor(tables.size(), static_cast<int>(tables.size()), 1,
-              [&](std::size_t n) { tables[n].text = tables[n].text_of(); });
-  for (const Table& table : tables) {
-    folder.Write(table.name, table.text);
-  }
+  // One after the other, because the tables of a large study take hundreds of megabytes each.
+  folder.Write("trials.csv", TrialsCsv(results));
+  folder.Write("trials_wide.csv", TrialsWideCsv(results));
+  folder.Write("summary.csv", SummaryCsv(results));
+  folder.Write("results.sqlite", ResultsSqlite(results));
+  folder.Write("report.html", StudyReportHtml(results, folder.Root()));
   return results;
 }
 
