@@ -76,7 +76,7 @@ void ReadTrial(const fs::path& folder, TrialCheck check, SharedNames& names, Tri
 }
 
 // The part of a number's path before its last dot; empty without a dot.
-std::string_view GroupOf(std::string_view name) {
+std::string_view FindGroup(std::string_view name) {
   const std::size_t dot = name.rfind('.');
   return name.substr(0, dot == name.npos ? 0 : dot);
 }
@@ -89,10 +89,10 @@ SharedNames::Filter MakeFilter(std::size_t trials, const std::vector<std::string
   std::set<std::string, std::less<>> groups;
   for (const std::string& metric : metrics) {
     for (const std::string& operand : ListOperands(metric)) {
-      groups.emplace(GroupOf(operand));
+      groups.emplace(FindGroup(operand));
     }
   }
-  return [groups](std::string_view name) { return groups.contains(GroupOf(name)); };
+  return [groups](std::string_view name) { return groups.contains(FindGroup(name)); };
 }
 
 // Reads all trials in parallel: a study has many, and reading them takes most of the time of its
@@ -217,7 +217,7 @@ StudyResults ReadStudyResults(const fs::path& folder, TrialCheck check,
     results.notes.push_back(fmt::format(
         "the study has more than {} trials, so its tables hold the numbers beside the metric alone "
         "(of the group {}); trial.json of each trial has all",
-        kMostTrialsInFull, GroupOf(ListOperands(results.metric).front())));
+        kMostTrialsInFull, FindGroup(ListOperands(results.metric).front())));
   }
   std::ranges::copy(VersionNotes(results), std::back_inserter(results.notes));
   std::ranges::copy(AreaNotes(results), std::back_inserter(results.notes));

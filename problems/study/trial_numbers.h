@@ -50,10 +50,10 @@ class SharedNames {
   NamedNumbers Name(const std::string& paths, const std::vector<double>& values);
 
  private:
-  // Where the numbers of one kind of file go.
+  // The destination of the numbers of one kind of file.
   struct Layout {
     std::shared_ptr<const std::vector<std::string>> names;
-    std::vector<std::size_t> places;  // of each number in `names`; names->size() if it is not kept
+    std::vector<std::size_t> places;  // index in `names` per number; names->size() if not kept
   };
   Layout MakeLayout(std::string_view paths) const;
   std::shared_ptr<const Layout> FindLayout(const std::string& paths);
