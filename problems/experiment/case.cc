@@ -7,6 +7,7 @@
 #include <set>
 
 #include "problems/experiment/extra_dowels.h"
+#include "problems/experiment/limit_depths.h"
 #include "problems/subject/condition_depths.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/landmark_mistakes.h"
@@ -216,6 +217,7 @@ Case StartCase(const SubjectData& data, const Experiment& experiment, const Mesh
                .scored_network = {},
                .points = {},
                .basis = {},
+               .bounds = StartEffects(experiment.tissue.bounds),
                .notes = data.notes,
                .inputs = data.inputs};
   if (measured) {
@@ -361,6 +363,7 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQ
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
   GiveDepths(data, experiment, query, subject);
   InsertDowels(experiment, data, query, subject);
+  LimitDowels(experiment, data.landmarks, subject);
   const NetworkPlan plan = ReadNetworkPlan(experiment.network);
   Append(subject.notes,
          CheckNetworkSites(plan, experiment.network, data.landmarks.landmarks, experiment.sites));

@@ -39,6 +39,7 @@ struct Case {
   DowelNetwork scored_network;          // of scored_on_bone; depths are compared in front of it
   std::map<std::string, Vec3> points;   // all landmarks as given, with or without depth, mm
   ScoreBasis basis;                     // the landmarks as given; they decide what is scored
+  std::vector<BoundEffect> bounds;      // one per entry of tissue.bounds
   std::vector<std::string> notes;       // for readers of the result, one line each
   std::vector<std::filesystem::path> inputs;  // for the manifest
 };

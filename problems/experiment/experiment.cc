@@ -125,6 +125,22 @@ std::vector<std::string> TableMeans(const DepthScheme& scheme) {
   return options;
 }
 
+// Checks the bounds of depth against each other and against depths that are set by hand.
+void CheckBounds(const Experiment& experiment, std::vector<OptionFault>& faults) {
+  for (const OptionFault& fault : BoundFaults(experiment.tissue)) {
+    faults.push_back({"tissue." + fault.path, fault.what});
+  }
+  for (const auto& [name, site] : experiment.sites) {
+    if (!site.depth || site.depth->automatic || !IsStandardSite(name)) {
+      continue;  // a site of one's own is checked where it lies on the bone
+    }
+    const DepthRange range = AllowedAt(experiment.tissue.bounds, name);
+    if (!range.Contains(site.depth->value)) {
+      faults.push_back({fmt::format("sites.{}.depth", name), KnownDepthFault(*site.depth, range)});
+    }
+  }
+}
+
 // The table's mean adds no information to the table's own depths.
 void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& faults) {
   for (const std::string& option : TableMeans(WayToDepth(experiment))) {
@@ -330,6 +346,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   for (const OptionFault& fault : SiteOptionFaults(experiment.sites)) {
     faults.push_back({"sites." + fault.path, fault.what});
   }
+  CheckBounds(experiment, faults);
   CheckExpected(experiment, faults);
   CheckPhantom(experiment.subject, faults);
   CheckRegion(experiment.region, faults);

@@ -12,6 +12,7 @@
 #include "problems/experiment/dowel_projection.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/extra_dowels.h"
+#include "problems/experiment/limit_depths.h"
 #include "problems/io/manifest.h"
 #include "problems/subject/average_skull.h"
 #include "problems/subject/sites.h"
@@ -226,6 +227,7 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
     return ApplyOutsideRule(e.outside, stage.Input(),
                             InterpolateDepth(WayToDepth(e), stage.Input(), context), context);
   });
+  LimitDepths(e, stage.shell, stage.subject, stage.depth);
   stage.subject.notes.insert(stage.subject.notes.end(), stage.depth.notes.begin(),
                              stage.depth.notes.end());
   NoteEnds(stage.depth, stage.subject.notes);

@@ -84,6 +84,20 @@ Json VariogramToJson(const DepthComparison& comparison) {
   return json;
 }
 
+Json BoundsToJson(std::span<const BoundEffect> effects) {
+  Json json = Json::array();
+  for (const BoundEffect& effect : effects) {
+    json.push_back({{"holds", effect.name},
+                    {"least_mm", effect.least_mm ? Json(*effect.least_mm) : Json(nullptr)},
+                    {"most_mm", effect.most_mm ? Json(*effect.most_mm) : Json(nullptr)},
+                    {"moved_dowels", effect.dowels},
+                    {"bone_cm2", effect.bone_cm2},
+                    {"moved_share", effect.moved_share},
+                    {"largest_move_mm", effect.largest_move_mm}});
+  }
+  return json;
+}
+
 }  // namespace
 
 Json ScoresToJson(const DepthScores& s) {
@@ -124,6 +138,9 @@ Json DepthToJson(const DepthField& depth, const Case& subject) {
                        {"signal_mm", depth.process->signal_mm},
                        {"nugget_mm", depth.process->nugget_mm},
                        {"mean_mm", depth.process->mean_mm}};
+  }
+  if (!subject.bounds.empty()) {
+    json["bounds"] = BoundsToJson(subject.bounds);
   }
   for (const SchemeShare& share : depth.shares) {
     json["shares"][share.scheme] = share.weight;

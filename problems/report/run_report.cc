@@ -256,6 +256,32 @@ ReportTable DepthTable(const Json& depth) {
   return table;
 }
 
+// The bounds that the expert stated, and what they moved. No table if there are none.
+std::vector<ReportTable> BoundTables(const Json& depth) {
+  ReportTable table{"Bounds on the tissue depth (tissue.bounds)",
+                    {"where", "least (mm)", "most (mm)", "bone (cm²)", "moved (%)",
+                     "moved by up to (mm)", "depth markers moved"}};
+  for (const Json& bound : depth.value("bounds", Json::array())) {
+    const auto moved = bound.at("moved_dowels").get<std::vector<std::string>>();
+    table.AddRow(bound.at("holds").get<std::string>(), Number(bound.at("least_mm")),
+                 Number(bound.at("most_mm")), Number(bound.at("bone_cm2")),
+                 TableNumber(100 * bound.at("moved_share").get<double>(), 1),
+                 Number(bound.at("largest_move_mm")),
+                 moved.empty() ? "none" : fmt::format("{}", fmt::join(moved, ", ")));
+  }
+  return table.rows.empty() ? std::vector<ReportTable>() : std::vector{std::move(table)};
+}
+
+ReportSection DepthSection(const Json& result) {
+  ReportSection section{.heading = "Depth and first face",
+                        .tables = {DepthTable(result.at("depth"))},
+                        .folded = true};
+  std::ranges::move(BoundTables(result.at("depth")), std::back_inserter(section.tables));
+  section.tables.push_back(
+      CountsTable("First face: the implicit surface of these depths", result.at("implicit")));
+  return section;
+}
+
 void AddProtocols(const Json& face, ReportSection& section) {
   if (!face.contains("protocols")) {
     return;
@@ -591,11 +617,7 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
   if (HasSigma(result)) {
     sections.push_back(UncertaintySection(result, folder));
   }
-  sections.push_back({.heading = "Depth and first face",
-                      .tables = {DepthTable(result.at("depth")),
-                                 CountsTable("First face: the implicit surface of these depths",
-                                             result.at("implicit"))},
-                      .folded = true});
+  sections.push_back(DepthSection(result));
   if (result.contains("rules") && !result.at("rules").empty()) {
     sections.push_back(RulesSection(result.at("rules")));
   }

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "interp/dowels/dowel.h"
+#include "problems/subject/depth_bounds.h"
 #include "problems/subject/landmarks.h"
 #include "problems/subject/tissue_table.h"
 #include "surfaces/base/fields.h"
@@ -144,6 +145,7 @@ struct TissueOptions {
   double sds = 0;
   std::map<std::string, double> set_mm;
   TissueGiven given;
+  std::vector<DepthBound> bounds;
 };
 
 template <class Visitor>
@@ -185,6 +187,12 @@ void Fields(Visitor& visit, TissueOptions& o) {
                          "index, and the standard deviations become the remaining uncertainty; the "
                          "interpolation uses both (docs/how-to/populations.md)"},
         o.given);
+  visit(FieldInfo{.name = "bounds",
+                  .doc = "limits of the depth that an expert knows, e.g. [{region: cheeks, "
+                         "least_mm: 6, most_mm: 20}, {sites: [zy], most_mm: 12}]: depths of a "
+                         "table and interpolated depths beyond them become the nearest allowed "
+                         "ones (docs/how-to/populations.md)"},
+        o.bounds);
 }
 template <class Report>
 void CheckValue(Report& report, const TissueOptions& o) {

@@ -7,6 +7,7 @@
 #include <array>
 #include <cctype>
 #include <iterator>
+#include <map>
 #include <optional>
 #include <span>
 #include <utility>
@@ -14,6 +15,7 @@
 
 #include "problems/config/spelling_suggestion.h"
 #include "problems/config/utf8_check.h"
+#include "surfaces/base/error.h"
 #include "surfaces/base/lower_case.h"
 
 namespace semblance::problems {
@@ -313,6 +315,20 @@ std::vector<std::string> StandardSiteCodes() {
 std::string DescribeSite(std::string_view site) {
   const Site* const known = FindLandmark(WithoutSide(site));
   return known == nullptr ? std::string(site) : fmt::format("{} ({})", site, known->name);
+}
+
+int FacePartOfSite(const std::string& site) {
+  static const std::map<std::string, int> kPartOf = {
+      {"sg", 0}, {"g", 0},  {"fe", 0}, {"mso", 1}, {"mio", 1}, {"n", 2},   {"rhi", 2},
+      {"im", 3}, {"lo", 3}, {"zy", 3}, {"sM2", 3}, {"mp", 4},  {"pr", 4},  {"id", 4},
+      {"sm", 5}, {"pg", 5}, {"me", 5}, {"go", 6},  {"mr", 6},  {"iM2", 6}, {"sgl", 7}};
+  const auto found = kPartOf.find(WithoutSide(site));
+  if (found == kPartOf.end()) {
+    throw InputError(fmt::format(
+        "face region: site '{}' belongs to no part of the face; known are the 21 standard sites",
+        site));
+  }
+  return found->second;
 }
 
 std::string StandardSiteFault(std::string_view site) {

@@ -3,6 +3,8 @@
 // People may name a site by its code, its number in the thesis or a plain name.
 #pragma once
 
+#include <algorithm>
+#include <array>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -47,6 +49,20 @@ bool IsSite(std::string_view name);  // standard or further
 
 // "go_l (Gonion)"; a code without side also works. The code alone if the site is in neither list.
 std::string DescribeSite(std::string_view site);
+
+// Names of the parts of the face. FacePartOfSite returns the part of a standard site, as an index
+// of this list. It throws InputError for another site.
+inline constexpr std::array<const char*, 8> kFaceParts = {"forehead", "orbits", "nose", "cheeks",
+                                                          "mouth",    "chin",   "jaw",  "temples"};
+int FacePartOfSite(const std::string& site);
+
+// A part of the face as an option, in the order of kFaceParts.
+enum class FacePart { kForehead, kOrbits, kNose, kCheeks, kMouth, kChin, kJaw, kTemples };
+constexpr auto EnumNames(FacePart) {
+  std::array<std::string_view, kFaceParts.size()> names;
+  std::ranges::copy(kFaceParts, names.begin());
+  return names;
+}
 
 // Empty if `site` is a standard site; otherwise the fault and the remedy.
 std::string StandardSiteFault(std::string_view site);

@@ -7,7 +7,6 @@
 
 #include "interp/dowels/dowel.h"
 #include "problems/experiment/metrics/outer_skin.h"
-#include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 
@@ -70,20 +69,6 @@ std::map<std::string, Vec3> WithDowels(std::map<std::string, Vec3> points,
 
 FaceRegion WholeSurface(const TriMesh& truth) {
   return {std::vector<bool>(truth.points.size(), true), std::vector<int>(truth.points.size(), -1)};
-}
-
-int FacePartOfSite(const std::string& site) {
-  static const std::map<std::string, int> kPartOf = {
-      {"sg", 0}, {"g", 0},  {"fe", 0}, {"mso", 1}, {"mio", 1}, {"n", 2},   {"rhi", 2},
-      {"im", 3}, {"lo", 3}, {"zy", 3}, {"sM2", 3}, {"mp", 4},  {"pr", 4},  {"id", 4},
-      {"sm", 5}, {"pg", 5}, {"me", 5}, {"go", 6},  {"mr", 6},  {"iM2", 6}, {"sgl", 7}};
-  const auto found = kPartOf.find(WithoutSide(site));
-  if (found == kPartOf.end()) {
-    throw InputError(fmt::format(
-        "face region: site '{}' belongs to no part of the face; known are the 21 standard sites",
-        site));
-  }
-  return found->second;
 }
 
 int NearestPart(const Vec3& p, const std::map<std::string, Vec3>& points) {

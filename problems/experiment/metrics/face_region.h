@@ -13,6 +13,7 @@
 #include "interp/dowels/dowel_network.h"
 #include "problems/experiment/metrics/outer_skin.h"
 #include "problems/subject/average_skull.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/fields.h"
 #include "surfaces/mesh/cut_planes.h"
 #include "surfaces/mesh/tri_mesh.h"
@@ -95,12 +96,6 @@ void Fields(Visitor& visit, FaceRegionOptions& o) {
 // ---------------------------------------------------------------------------------------------
 // Regions
 // ---------------------------------------------------------------------------------------------
-
-// Names of the parts of the face. FacePartOfSite returns the part of a site, as an index of this
-// list. It throws InputError for an unknown site.
-inline constexpr std::array<const char*, 8> kFaceParts = {"forehead", "orbits", "nose", "cheeks",
-                                                          "mouth",    "chin",   "jaw",  "temples"};
-int FacePartOfSite(const std::string& site);
 
 // One entry per vertex of a mesh.
 struct FaceRegion {
