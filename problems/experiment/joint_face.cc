@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -18,6 +19,7 @@
 #include "problems/experiment/likely_face.h"
 #include "problems/face/hspline_prior.h"
 #include "problems/face/joint_fit.h"
+#include "problems/face/joint_posterior.h"
 #include "problems/subject/extra_sites.h"
 #include "surfaces/hspline_query/hspline_project.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -30,8 +32,9 @@ struct SlidingDowel {
   FitPoint point;  // uv: of the site
   Vec2 foot_uv = Vec2::Constant(kNaN);
   bool is_held = false;
-  Vec3 direction = Vec3::Zero();  // of a further error, as in ShapeTip
+  Vec3 direction = Vec3::Zero();  // of further errors, as in ShapeTip
   double along_sd_mm = 0;
+  double shared_sd_mm = 0;
 };
 
 // The implicit face as an observed surface.
@@ -40,6 +43,7 @@ class ImplicitObserver {
   ImplicitObserver(const TriMesh& implicit, const ShapeTarget& target)
       : mesh_(implicit),
         sd_mm_(target.surface_sd_mm),
+        error_mm_(target.surface_error_mm),
         query_(implicit),
         normals_(VertexNormals(implicit)) {}
 
@@ -50,20 +54,25 @@ class ImplicitObserver {
     const MeshPoint at = query_.Closest(seed.position);
     const ModelPoint place{at.triangle, at.weights};
     const Vec3 normal = FindPosition(place, mesh_, normals_).normalized();
-    const Triangle& t = mesh_.triangles[at.triangle];
-    const double sd_mm = sd_mm_.empty()
-                             ? options.surface_sd_mm
-                             : at.weights.dot(Vec3(sd_mm_[t[0]], sd_mm_[t[1]], sd_mm_[t[2]]));
+    const double sd_mm = sd_mm_.empty() ? options.surface_sd_mm : ValueAt(at, sd_mm_);
     return {.uv = seed.uv,
             .position = seed.position,
             .whitening = normal.transpose() / sd_mm,
             .loss_width = options.surface_loss_width,
-            .weight = weight};
+            .weight = weight,
+            .shared_mm = normal,  // times the deviation, which follows from the nearest dowel
+            .smooth_sd_mm = error_mm_.empty() ? sd_mm : ValueAt(at, error_mm_)};
   }
 
  private:
+  double ValueAt(const MeshPoint& at, const std::vector<double>& values) const {
+    const Triangle& t = mesh_.triangles[at.triangle];
+    return at.weights.dot(Vec3(values[t[0]], values[t[1]], values[t[2]]));
+  }
+
   const TriMesh& mesh_;
   const std::vector<double>& sd_mm_;
+  const std::vector<double>& error_mm_;
   MeshQuery query_;
   std::vector<Vec3> normals_;
 };
@@ -100,6 +109,11 @@ std::vector<ScheduleStep> AllSteps(const SchedulePlan& plan) {
     });
   }
   return steps;
+}
+
+// The corners of the patches of the level.
+DomainGrid CornersOfPatches(const HSplineShape& shape, int level) {
+  return {.columns = (shape.patches_u << level) + 1, .rows = (shape.patches_v << level) + 1};
 }
 
 class JointFitter {
@@ -162,6 +176,7 @@ class JointFitter {
       if (tip != target_.tips.end()) {
         dowel.direction = tip->direction;
         dowel.along_sd_mm = tip->along_sd_mm;
+        dowel.shared_sd_mm = tip->shared_sd_mm;
       }
       dowel.foot_uv = dowel.point.uv;
       dowels_.push_back(dowel);
@@ -193,6 +208,7 @@ class JointFitter {
       FitPoint& seed = seeding_.points[k];
       seed.weight = options_.use.estimate.surface_worth * areas[k] / all;
       data_.seeds.push_back(implicit_->Observe(seed, options_.use.estimate, seed.weight));
+      data_.seeds.back().shared_mm *= NearestDowel(seed.position).shared_sd_mm;
     }
   }
 
@@ -203,17 +219,25 @@ class JointFitter {
                                 [&](const Sphere& feature) {
                                   return (feature.center - p).norm() < feature.radius_mm;
                                 }) &&
-           std::ranges::any_of(dowels_, [&](const SlidingDowel& dowel) {
-             return (dowel.point.position - p).norm() < range_mm;
-           });
+           !dowels_.empty() && (NearestDowel(p).point.position - p).norm() < range_mm;
   }
 
-  void Step(const ScheduleStep& step) {
-    context_.ThrowIfStopped();
+  const SlidingDowel& NearestDowel(const Vec3& p) const {
+    return *std::ranges::min_element(dowels_, {}, [&](const SlidingDowel& dowel) {
+      return (dowel.point.position - p).squaredNorm();
+    });
+  }
+
+  void ObserveDowels() {
     data_.dowels.clear();
     for (const SlidingDowel& dowel : dowels_) {
       ObserveDowel(dowel);
     }
+  }
+
+  void Step(const ScheduleStep& step) {
+    context_.ThrowIfStopped();
+    ObserveDowels();
     levels_.push_back(SolveJointStep(model_, data_, weights_, step, state_));
     Assemble();
     SlideDowels();
@@ -247,7 +271,8 @@ class JointFitter {
                             .position = dowel.point.position,
                             .whitening = normal.transpose() / normal_sd_mm,
                             .loss_width = estimate.tip_loss_width,
-                            .weight = dowel.point.weight};
+                            .weight = dowel.point.weight,
+                            .shared_mm = dowel.shared_sd_mm * dowel.direction};
     data_.dowels.push_back(seen);
     seen.uv = dowel.point.uv;
     seen.whitening = tangents / estimate.tip_tangent_sd_mm;
@@ -271,6 +296,56 @@ class JointFitter {
     }
   }
 
+  // Growth of sigma away from what was observed, for example where no bone was scanned.
+  double UnseenSd_mm(const Vec3& p) const {
+    const ShapeFitOptions& estimate = options_.use.estimate;
+    double nearest_mm = std::numeric_limits<double>::infinity();
+    for (const std::vector<SurfaceObservation>* const seen : {&data_.dowels, &data_.seeds}) {
+      for (const SurfaceObservation& one : *seen) {
+        nearest_mm = std::min(nearest_mm, (one.position - p).norm());
+      }
+    }
+    return estimate.unseen_rate * std::max(0.0, nearest_mm - estimate.unseen_reach_mm);
+  }
+
+  // Positions on the prior's mean.
+  std::vector<Vec3> OnMean(std::span<const Vec2> uv) const {
+    const auto& [face, laid] = *in_.prior;
+    std::vector<Vec3> places;
+    for (const Vec2& at : uv) {
+      places.push_back(FindPosition(laid.under[laid.grid.NearestTo(at)], face.model.mean,
+                                    face.model.mean.points));
+    }
+    return places;
+  }
+
+  SigmaGrid FindSigma() {
+    constexpr double kUnexpressed = 0.8;  // chosen by configs/studies/joint_sigma.yaml
+    const ShapeFitOptions& estimate = options_.use.estimate;
+    const int level = levels_.back().level;
+    ObserveDowels();  // where the last step has brought them
+    const JointPosterior posterior(model_, data_, weights_, estimate.surface_length_mm, level,
+                                   state_);
+    SigmaGrid sigma{.grid = CornersOfPatches(surface_.shape(), level), .sigma_mm = {}};
+    std::vector<Vec2> uv;
+    std::vector<Vec3> normals;
+    for (std::size_t k = 0; k < sigma.grid.size(); ++k) {
+      uv.push_back(sigma.grid.UvAt(k));
+      normals.push_back(surface_.Frame(uv.back()).Normal());
+    }
+    sigma.sigma_mm = posterior.DeviationsAlong(uv, normals);
+    for (std::size_t k = 0; k < uv.size(); ++k) {
+      sigma.sigma_mm[k] = std::hypot(sigma.sigma_mm[k], kUnexpressed * estimate.discrepancy_mm,
+                                     UnseenSd_mm(surface_.Point(uv[k])));
+    }
+    if (in_.experiment.tissue.depths == DepthSource::kTable) {
+      WidenWhereNoDowelIs(in_.prior->face, in_.subject.dowels_on_bone,
+                          SplitTableError(options_.use.table_depths, in_.experiment), OnMean(uv),
+                          sigma.sigma_mm);
+    }
+    return sigma;
+  }
+
   MadeFace Result() {
     FitResult fit{.surface = surface_, .levels = levels_, .relaxations = slides_};
     fit.restored_features = 0;
@@ -286,6 +361,9 @@ class JointFitter {
     }
     made_.fitted = {std::move(seeding_), std::move(points), std::move(fit)};
     MeasureResiduals(made_.fitted);
+    if (in_.tells_sigma) {
+      made_.sigma = FindSigma();
+    }
     return std::move(made_);
   }
 
@@ -327,7 +405,9 @@ class JointFitter {
 
 MadeFace MakeJointFace(const JointFace& options, PlacedTemplate placed, const FaceInput& in,
                        const RunContext& context) {
-  JointFitter fitter(options, FindLikelyFace(options.use, std::move(placed), in, context), in,
+  FaceInput of_start = in;
+  of_start.tells_sigma = false;  // sigma is that of the last step
+  JointFitter fitter(options, FindLikelyFace(options.use, std::move(placed), of_start, context), in,
                      context);
   MadeFace made = fitter.Run();
   TakeDraws(options.use, *in.prior, made);

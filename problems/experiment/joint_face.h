@@ -22,8 +22,14 @@ namespace semblance::problems {
 //
 // Then SolveJointStep moves vertices, coefficients and pose by the step's fraction. Dowels, seeds
 // and marks have Huber losses of the widths of `estimate`. `made.prior` has the model at the
-// solution. Its sigma and draws are those of the start, moved with it; its residuals and weights of
-// tips and marks are those of the start. Throws InputError as FindLikelyFace does; Cancelled.
+// solution. Its draws are those of the start, moved with it; its residuals and weights of tips and
+// marks are those of the start.
+//
+// Sigma (in.tells_sigma) is that of JointPosterior at the end of the last step, at the corners of
+// the patches of its level. Two parts are added in squares, as by EstimateShape:
+// 0.8 estimate.discrepancy_mm, because the deviation of the surface from the model expresses the
+// rest, and unseen_rate (d - unseen_reach_mm) at the distance d from the nearest tip or seed.
+// Throws InputError as FindLikelyFace does; Cancelled.
 MadeFace MakeJointFace(const JointFace& options, PlacedTemplate placed, const FaceInput& in,
                        const RunContext& context);
 

@@ -57,35 +57,6 @@ ShapeEstimate Estimate(const FacePrior& prior, const PriorUse& use, ShapeTarget&
   return EstimateShape(prior.model, target, use.estimate, context);
 }
 
-// With depths of a table the person's build is unknown. The tips carry this into sigma. Around
-// sites without a dowel, for example where no bone was scanned, no tip does, so the deviation of
-// the site is added here.
-void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
-                         const TableDepthOptions& table, std::vector<double>& sigma_mm) {
-  constexpr double kUsualDepth_mm = 10;  // stands for the unknown depth in PublishedSd_mm
-  std::map<std::string, Vec3> places;
-  for (const auto& [site, at] : prior.sites) {
-    places[site] = FindPosition(at, prior.model.mean, prior.model.mean.points);
-  }
-  std::map<std::string, double> missing_mm;
-  for (const auto& [site, place] : places) {
-    if (std::ranges::find(dowels, site, &Dowel::site) == dowels.end()) {
-      Dowel none;
-      none.site = site;
-      none.depth_mm = kUsualDepth_mm;
-      missing_mm[site] = table.shared * PublishedSd_mm(none);
-    }
-  }
-  for (std::size_t v = 0; v < sigma_mm.size() && !missing_mm.empty(); ++v) {
-    const auto nearest = std::ranges::min_element(places, {}, [&](const auto& place) {
-      return (place.second - prior.model.mean.points[v]).squaredNorm();
-    });
-    if (const auto missing = missing_mm.find(nearest->first); missing != missing_mm.end()) {
-      sigma_mm[v] = std::hypot(sigma_mm[v], missing->second);
-    }
-  }
-}
-
 // Without a pose of the subject no rule applies.
 RuleMarks ApplySubjectRules(const FaceInput& in, const FacePrior& prior) {
   return in.subject.basis.sites ? ApplyRules(in.experiment.rules, in.subject.points,
@@ -106,6 +77,32 @@ std::vector<std::uint64_t> ListDraws(const PriorUse& use, const UncertaintyOptio
 }
 
 }  // namespace
+
+void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
+                         const TableDepthOptions& table, std::span<const Vec3> on_mean,
+                         std::vector<double>& sigma_mm) {
+  constexpr double kUsualDepth_mm = 10;  // stands for the unknown depth in PublishedSd_mm
+  std::map<std::string, Vec3> places;
+  for (const auto& [site, at] : prior.sites) {
+    places[site] = FindPosition(at, prior.model.mean, prior.model.mean.points);
+  }
+  std::map<std::string, double> missing_mm;
+  for (const auto& [site, place] : places) {
+    if (std::ranges::find(dowels, site, &Dowel::site) == dowels.end()) {
+      Dowel none;
+      none.site = site;
+      none.depth_mm = kUsualDepth_mm;
+      missing_mm[site] = table.shared * PublishedSd_mm(none);
+    }
+  }
+  for (std::size_t v = 0; v < sigma_mm.size() && !missing_mm.empty(); ++v) {
+    const auto nearest = std::ranges::min_element(
+        places, {}, [&](const auto& place) { return (place.second - on_mean[v]).squaredNorm(); });
+    if (const auto missing = missing_mm.find(nearest->first); missing != missing_mm.end()) {
+      sigma_mm[v] = std::hypot(sigma_mm[v], missing->second);
+    }
+  }
+}
 
 void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made) {
   const HSplineSurface likely = made.fitted.fit.surface;
@@ -152,7 +149,7 @@ LikelyFace FindLikelyFace(const PriorUse& use, PlacedTemplate placed, const Face
     rules.rules[k].residual_mm = shape.mark_residual_mm[k];
   }
   if (table != nullptr) {
-    WidenWhereNoDowelIs(prior.face, dowels, *table, shape.sigma_mm);
+    WidenWhereNoDowelIs(prior.face, dowels, *table, prior.face.model.mean.points, shape.sigma_mm);
   }
   placed.face_from_template =
       Composed(shape.subject_from_model, prior.on_template.mean_from_template);

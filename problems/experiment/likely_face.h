@@ -16,6 +16,12 @@ struct LikelyFace {
 LikelyFace FindLikelyFace(const PriorUse& use, PlacedTemplate placed, const FaceInput& in,
                           const RunContext& context);
 
+// With depths of a table the person's build is unknown. The tips carry this into sigma. Around
+// sites without a dowel, for example where no bone was scanned, no tip does, so this function adds
+// the deviation of the nearest site. on_mean: positions on the prior's mean, one per sigma.
+void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
+                         const TableDepthOptions& table, std::span<const Vec3> on_mean,
+                         std::vector<double>& sigma_mm);
 // Adds uncertainty.samples random faces to `made`. With use.draw > 0 a random face also replaces
 // the face itself.
 void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made);

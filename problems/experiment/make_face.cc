@@ -392,7 +392,13 @@ FaceUncertainty PriorUncertainty(const UncertaintyOptions& options, const Loaded
   if (!options.sigma) {
     return result;
   }
-  result.sigma_mm = SigmaAt(face.uv, *made.prior, prior.face, prior.on_template);
+  if (made.sigma) {
+    for (const Vec2& uv : face.uv) {
+      result.sigma_mm.push_back(made.sigma->grid.Interpolate(made.sigma->sigma_mm, uv));
+    }
+  } else {
+    result.sigma_mm = SigmaAt(face.uv, *made.prior, prior.face, prior.on_template);
+  }
   const std::vector<WeightedValue> by_area = SortedValues(result.sigma_mm, VertexAreas(face.mesh));
   result.median_mm = Quantile(by_area, 0.5);
   result.p95_mm = Quantile(by_area, 0.95);

@@ -50,12 +50,19 @@ struct FaceInput {
   bool tells_sigma = true;                 // false: a prior's face gets no sigma, which saves time
 };
 
+// The standard deviation of a face along its normal, mm, at the points of a grid of its domain.
+struct SigmaGrid {
+  DomainGrid grid;
+  std::vector<double> sigma_mm;
+};
+
 struct MadeFace {
   PlacedTemplate placed;
   FaceFit fitted;
   std::optional<ShapeEstimate> prior;        // only if the face uses the prior
   std::vector<AppliedRule> rules = {};       // the rules that took part in the estimate
   std::vector<HSplineSurface> samples = {};  // uncertainty.samples random faces
+  std::optional<SigmaGrid> sigma = {};       // of `joint`; else sigma is the estimate's
 };
 
 // The prior of the experiment, laid on its template; null if its face does not use one. Throws as
@@ -81,8 +88,8 @@ MadeFace MakeFace(const FaceInput& in, const RunContext& context);
 std::optional<HSplineSurface> EditByHand(const Experiment& experiment, MadeFace& made,
                                          Case& subject);
 
-// Sigma and samples of a face that was made with a prior. Sigma is the posterior's, which includes
-// the discrepancy of the model, in place of the fit's.
+// Sigma and samples of a face that was made with a prior. Sigma is that of made.sigma, or else of
+// the estimate's posterior.
 FaceUncertainty PriorUncertainty(const UncertaintyOptions& options, const LoadedPrior& prior,
                                  const MadeFace& made, const Tessellation& face);
 

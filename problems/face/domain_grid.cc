@@ -43,6 +43,15 @@ std::size_t DomainGrid::NearestTo(const Vec2& uv) const {
   return cell(uv.x(), columns) + columns * cell(uv.y(), rows);
 }
 
+double DomainGrid::Interpolate(std::span<const double> values, const Vec2& uv) const {
+  const double x = uv.x() * (columns - 1), y = uv.y() * (rows - 1);
+  const int i = std::clamp(static_cast<int>(x), 0, columns - 2);
+  const int j = std::clamp(static_cast<int>(y), 0, rows - 2);
+  const auto at = [&](int column, int row) { return values[column + row * columns]; };
+  const auto mix = [](double a, double b, double share) { return (1 - share) * a + share * b; };
+  return mix(mix(at(i, j), at(i + 1, j), x - i), mix(at(i, j + 1), at(i + 1, j + 1), x - i), y - j);
+}
+
 DomainGrid MakeDomainGrid(const HSplineShape& shape) {
   constexpr int kPerPatch = 3;
   constexpr int kLeastPatches = 32;  // coarse surfaces are sampled as if they had so many

@@ -21,6 +21,8 @@ struct DomainGrid {
             static_cast<double>(k / columns) / (rows - 1)};
   }
   std::size_t NearestTo(const Vec2& uv) const;  // index of the point
+  // The bilinear interpolation of values at the points. uv: in [0,1] x [0,1].
+  double Interpolate(std::span<const double> values, const Vec2& uv) const;
 };
 
 // Three samples along each side of a patch of the finest level, and at least 97 along each side of

@@ -2,6 +2,7 @@
 #include "problems/face/joint_fit.h"
 
 #include <ceres/cost_function.h>
+#include <ceres/crs_matrix.h>
 #include <ceres/loss_function.h>
 #include <ceres/problem.h>
 #include <ceres/solver.h>
@@ -10,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 #include <span>
+#include <string_view>
 #include <utility>
 
 #include "problems/face/shape_model/shape_cost.h"
@@ -165,7 +167,8 @@ class JointStep {
     summary.free_vertices = static_cast<int>(net_.vertices.size());
     summary.solver = "ceres";
     for (const Part& part : parts_) {
-      summary.terms.push_back({.term = part.name, .before = Cost(part), .after = kNaN});
+      summary.terms.push_back(
+          {.term = std::string(part.name), .before = Cost(part), .after = kNaN});
     }
     const ceres::Solver::Summary solved = RunCeres();
     for (std::size_t k = 0; k < parts_.size(); ++k) {
@@ -177,6 +180,25 @@ class JointStep {
     return summary;
   }
 
+  // The Jacobian of a part of the problem; without rows if there is no such part.
+  Eigen::SparseMatrix<double> Jacobian(std::string_view name) {
+    ceres::Problem::EvaluateOptions options;
+    options.parameter_blocks = ShapeBlocks(parameters_);
+    for (Vec3& vertex : net_.vertices) {
+      options.parameter_blocks.push_back(vertex.data());
+    }
+    const auto part = std::ranges::find(parts_, name, &Part::name);
+    if (part == parts_.end()) {
+      return Eigen::SparseMatrix<double>(0, parameters_.size() + 3 * std::ssize(net_.vertices));
+    }
+    options.residual_blocks = part->blocks;
+    ceres::CRSMatrix rows;
+    problem_.Evaluate(options, nullptr, nullptr, nullptr, &rows);
+    return Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
+        rows.num_rows, rows.num_cols, std::ssize(rows.values), rows.rows.data(), rows.cols.data(),
+        rows.values.data());
+  }
+
   // At the solution.
   const ControlNet& net() const { return net_; }
   const ShapeParameters& parameters() const { return parameters_; }
@@ -184,7 +206,7 @@ class JointStep {
  private:
   // A group of residual blocks, and its name in the summary.
   struct Part {
-    const char* name;
+    std::string_view name;
     std::vector<ceres::ResidualBlockId> blocks;
   };
 
@@ -404,13 +426,32 @@ JointState StartJoint(const HSplineShape& shape, const ShapeFrame& frame,
   return state;
 }
 
+namespace {
+
+void RequireLevel(int level, const VertexModel& model) {
+  if (level < 0 || level > model.shape.max_level) {
+    throw InputError(fmt::format("joint fit: the face has no level {}; its levels are 0 to {}",
+                                 level, model.shape.max_level));
+  }
+}
+
+}  // namespace
+
+JointRows LinearizeJointStep(const VertexModel& model, const JointData& data,
+                             const JointWeights& weights, int level, const JointState& state) {
+  RequireLevel(level, model);
+  JointStep step(model, data, weights, level, state);
+  return {.dowels = step.Jacobian("dowels"),
+          .seeds = step.Jacobian("seeds"),
+          .marks = step.Jacobian("marks"),
+          .residual_field = step.Jacobian("residual_field"),
+          .face_model = step.Jacobian("face_model")};
+}
+
 LevelSummary SolveJointStep(const VertexModel& model, const JointData& data,
                             const JointWeights& weights, const ScheduleStep& step,
                             JointState& state) {
-  if (step.level < 0 || step.level > model.shape.max_level) {
-    throw InputError(fmt::format("joint fit: the face has no level {}; its levels are 0 to {}",
-                                 step.level, model.shape.max_level));
-  }
+  RequireLevel(step.level, model);
   const double rms_before_mm = ObservedRms_mm(model, data, state);
   JointStep joint(model, data, weights, step.level, state);
   LevelSummary summary = joint.Solve();

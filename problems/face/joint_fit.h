@@ -5,6 +5,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/SparseCore>
 #include <array>
 #include <string>
 #include <vector>
@@ -43,6 +44,9 @@ struct SurfaceObservation {
   Eigen::Matrix<double, Eigen::Dynamic, 3> whitening;
   double loss_width = kNaN;
   double weight = 1;
+  // For JointPosterior, as in ShapeObservation: a shared error, and an error like the neighbours'.
+  Vec3 shared_mm = Vec3::Zero();
+  double smooth_sd_mm = 0;
 };
 
 struct JointData {
@@ -72,6 +76,15 @@ struct JointState {
 JointState StartJoint(const HSplineShape& shape, const ShapeFrame& frame,
                       const ShapeParameters& parameters);
 
+// The Jacobian of a step's problem at `state`, part by part, times the roots of weights and losses.
+// Columns: pose (7), coefficients, field, then x, y and z of each vertex of residual[level]. Rows:
+// those of the observations in their order, of MakeFieldRows (three each), and one per parameter of
+// the model. Throws InputError for a level that the model does not have.
+struct JointRows {
+  Eigen::SparseMatrix<double> dowels, seeds, marks, residual_field, face_model;
+};
+JointRows LinearizeJointStep(const VertexModel& model, const JointData& data,
+                             const JointWeights& weights, int level, const JointState& state);
 // Solves one step and moves the vertices of its level and the parameters by its fraction of the way
 // to the solution. The solution makes least, over the vertices r_i of residual[level], the pose,
 // and the coefficients w and a,

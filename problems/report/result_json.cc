@@ -340,7 +340,7 @@ Json UncertaintyJson(const RunResult& result) {
 }
 
 // The fit of the face model to the dowels and the implicit face.
-Json PriorJson(const ShapeEstimate& estimate) {
+Json PriorJson(const ShapeEstimate& estimate, const std::optional<FaceUncertainty>& uncertainty) {
   const auto rms = [](auto&& values) {
     double sum = 0;
     for (const double value : values) {
@@ -348,6 +348,9 @@ Json PriorJson(const ShapeEstimate& estimate) {
     }
     return std::sqrt(sum / static_cast<double>(std::size(values)));
   };
+  // `joint` states sigma for its own face alone.
+  const std::vector<double>& sigma_mm =
+      estimate.sigma_mm.empty() && uncertainty ? uncertainty->sigma_mm : estimate.sigma_mm;
   Json dowel_weights = Json::object();
   for (std::size_t k = 0; k < estimate.tip_labels.size(); ++k) {
     dowel_weights[estimate.tip_labels[k]] = estimate.tip_weight[k];
@@ -357,7 +360,7 @@ Json PriorJson(const ShapeEstimate& estimate) {
           {"coefficients_rms", rms(estimate.coefficients)},
           {"scale", estimate.subject_from_model.scale},
           {"field_rms_mm", estimate.field_rms_mm},
-          {"sigma_rms_mm", rms(estimate.sigma_mm)},
+          {"sigma_rms_mm", rms(sigma_mm)},
           {"dowels", estimate.tip_residual_mm.size()},
           {"dowel_rms_mm", rms(estimate.tip_residual_mm)},
           {"dowel_weights", dowel_weights},
@@ -440,7 +443,7 @@ Json ResultJson(const Experiment& experiment, const RunResult& result) {
   json["implicit"] = ImplicitJson(result.implicit);
   json["fit"] = FitJson(result);
   if (result.prior) {
-    json["prior"] = PriorJson(*result.prior);
+    json["prior"] = PriorJson(*result.prior, result.uncertainty);
     json["rules"] = RulesJson(result.rules);
   }
   if (result.bust) {
