@@ -59,7 +59,7 @@ const std::map<std::string, Ranks> kModules = {
       {"parameters", "space"},
       {"terms"},
       {"nested", "solve"},
-      {"relaxation", "uncertainty"},
+      {"relaxation", "springs", "uncertainty"},
       {"plan"},
       {kFrontDoor}}},
     {"problems",

@@ -335,6 +335,9 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
   if (const auto* const seeds = std::get_if<SeedOptions>(&experiment.seeds)) {
     check.At("seeds.direction_level", seeds->direction_level);
   }
+  if (const auto* const springs = std::get_if<SpringFace>(&experiment.face)) {
+    check.At("face.level", springs->level);
+  }
   std::vector<OptionFault> faults = check.Take();
   for (const FitFault& fault : FindFitFaults(experiment.fit, levels.finest)) {
     faults.push_back(

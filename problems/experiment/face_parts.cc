@@ -5,6 +5,8 @@
 #include <utility>
 #include <variant>
 
+#include "problems/face/domain_grid.h"
+#include "surfaces/base/thin_plate.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {
@@ -65,6 +67,26 @@ void MeasureResiduals(FaceFit& fitted) {
   }
   fit.point_rms_mm = std::sqrt(all / weight);
   fit.dowel_rms_mm = std::sqrt(of_dowels / dowel_weight);
+}
+
+PointPairs FromSitesToTips(const HSplineSurface& surface, const FitTarget& dowels) {
+  PointPairs pairs;
+  for (const FitPoint& point : dowels.points) {
+    pairs.from.push_back(surface.Point(point.uv));
+    pairs.to.push_back(point.position);
+  }
+  return pairs;
+}
+
+HSplineSurface UnderThinPlate(const HSplineSurface& surface, const PointPairs& pairs,
+                              double stiffness_mm) {
+  std::vector<Vec3> samples;
+  const ThinPlate plate = FitThinPlate(pairs.from, pairs.to, {}, {.stiffness_mm = stiffness_mm});
+  const DomainGrid grid = MakeDomainGrid(surface.shape());
+  for (std::size_t k = 0; k < grid.size(); ++k) {
+    samples.push_back(plate(surface.Point(grid.UvAt(k))));
+  }
+  return SurfaceThrough(surface.shape(), grid, samples);
 }
 
 FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels) {

@@ -20,6 +20,19 @@ SeedResult MakeSeeds(const HSplineSurface& surface, const MeshQuery& query, cons
 // the fit has not made.
 void MeasureResiduals(FaceFit& fitted);
 
+// Points and where they belong, mm.
+struct PointPairs {
+  std::vector<Vec3> from, to;
+};
+
+// From the sites of the dowels on the surface to their tips.
+PointPairs FromSitesToTips(const HSplineSurface& surface, const FitTarget& dowels);
+
+// The surface under the thin plate that brings `from` to `to`; stiffness 0 meets all of them.
+// Throws InputError as FitThinPlate does.
+HSplineSurface UnderThinPlate(const HSplineSurface& surface, const PointPairs& pairs,
+                              double stiffness_mm);
+
 // A face without a fit, in the form of a fit's result.
 FaceFit Unfitted(HSplineSurface surface, const FitTarget& dowels);
 

@@ -17,6 +17,7 @@
 #include "problems/experiment/face_parts.h"
 #include "problems/experiment/joint_face.h"
 #include "problems/experiment/likely_face.h"
+#include "problems/experiment/spring_face.h"
 #include "problems/face/edit_script.h"
 #include "problems/face/hspline_prior.h"
 #include "problems/face/prior_observations.h"
@@ -161,19 +162,6 @@ FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInp
 // Bending
 // ---------------------------------------------------------------------------------------------
 
-struct PointPairs {
-  std::vector<Vec3> from, to;
-};
-
-PointPairs FromSitesToTips(const HSplineSurface& surface, const FitTarget& dowels) {
-  PointPairs pairs;
-  for (const FitPoint& point : dowels.points) {
-    pairs.from.push_back(surface.Point(point.uv));
-    pairs.to.push_back(point.position);
-  }
-  return pairs;
-}
-
 // The landmarks that both skulls have.
 PointPairs FromSkullToSkull(const std::filesystem::path& reference,
                             const Similarity& face_from_template,
@@ -194,17 +182,6 @@ PointPairs FromSkullToSkull(const std::filesystem::path& reference,
                     reference.string(), pairs.from.size(), kFewestLandmarks));
   }
   return pairs;
-}
-
-HSplineSurface UnderThinPlate(const HSplineSurface& surface, const PointPairs& pairs,
-                              double stiffness_mm) {
-  std::vector<Vec3> samples;
-  const ThinPlate plate = FitThinPlate(pairs.from, pairs.to, {}, {.stiffness_mm = stiffness_mm});
-  const DomainGrid grid = MakeDomainGrid(surface.shape());
-  for (std::size_t k = 0; k < grid.size(); ++k) {
-    samples.push_back(plate(surface.Point(grid.UvAt(k))));
-  }
-  return SurfaceThrough(surface.shape(), grid, samples);
 }
 
 // ---------------------------------------------------------------------------------------------
@@ -324,6 +301,11 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
   made.fitted = FitFace(PlanFitOnPrior(o, in), made.placed, in, known, context);
   TakeDraws(o.use, *in.prior, made);
   return made;
+}
+
+MadeFace MakeFace(const SpringFace& o, PlacedTemplate placed, const FaceInput& in,
+                  const RunContext& context) {
+  return MakeSpringFace(o, std::move(placed), in, context);
 }
 
 MadeFace MakeFace(const JointFace& o, PlacedTemplate placed, const FaceInput& in,

@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "fitting/problem/seeding.h"
+#include "fitting/springs/spring_net.h"
 #include "problems/face/prior_observations.h"
 #include "problems/face/residual_field.h"
 #include "surfaces/base/fields.h"
@@ -73,6 +74,23 @@ struct FittedTemplate {
 };
 template <class Visitor>
 void Fields(Visitor&, FittedTemplate&) {}
+
+// The template as a network of springs, held at the tissue depth over the skull (thesis 5.3;
+// spring_face.h).
+struct SpringFace {
+  static constexpr std::string_view kName = "springs";
+  int level = 1;
+  SpringOptions springs;
+};
+template <class Visitor>
+void Fields(Visitor& visit, SpringFace& o) {
+  visit(FieldInfo{.name = "level",
+                  .min = 0,
+                  .max = 3,
+                  .doc = "the net has two vertices along each side of a patch of this level"},
+        o.level);
+  Fields(visit, o.springs);
+}
 
 // The options of every face that uses the prior.
 struct PriorUse {
@@ -163,7 +181,7 @@ void Fields(Visitor& visit, JointFace& o) {
 }
 
 using FaceSource = std::variant<AutoFace, FittedTemplate, PlacedFace, ThinPlateFace, ReferenceFace,
-                                PriorFace, PriorThenFit, JointFace>;
+                                SpringFace, PriorFace, PriorThenFit, JointFace>;
 
 // Null for a face that does not use the prior.
 inline const PriorUse* FindPriorUse(const FaceSource& face) {
