@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <span>
 #include <utility>
 
@@ -83,9 +84,22 @@ Eigen::Matrix<double, 3, Eigen::Dynamic> PrincipalAxes(const NestedPoints& point
 
 using Originals = std::vector<std::uint32_t>;  // per point its original; itself if it is no copy
 
-// Moves the copies to points.repeated.
+// Moves the copies to points.repeated. Earlier copies of a point that is now a copy itself become
+// near copies of its original.
 void SeparateCopies(const Originals& original, NestedPoints& points) {
   std::size_t kept = 0;
+  std::map<std::uint32_t, std::uint32_t> original_of;  // given indices
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    if (original[k] != k) {
+      original_of.emplace(points.given[k], points.given[original[k]]);
+    }
+  }
+  for (RepeatedPoint& copy : points.repeated) {
+    if (const auto found = original_of.find(copy.first); found != original_of.end()) {
+      copy.first = found->second;
+      copy.is_exact = false;
+    }
+  }
   for (std::size_t k = 0; k < points.size(); ++k) {
     if (const std::size_t of = original[k]; of != k) {
       const bool is_exact = points.uv[of] == points.uv[k] && points.value[of] == points.value[k];
@@ -226,11 +240,17 @@ void SeparateClosest(NestedPoints& points) {
   }
 }
 
-// Returns whether the copies differ from their originals by less than half of the noise.
+// Copies that were separated before because their values agree.
+std::size_t CountNearCopies(const NestedPoints& points) {
+  return static_cast<std::size_t>(
+      std::ranges::count(points.repeated, false, &RepeatedPoint::is_exact));
+}
+
+// Returns whether most copies differ from their originals by less than half of the noise.
 bool ShareTheirErrors(const NestedPoints& points, const Originals& original) {
   constexpr double kShare = 0.5;
   std::vector<std::uint32_t> originals;
-  std::vector<double> apart_mm;
+  std::vector<double> apart_mm(CountNearCopies(points), 0.0);
   for (std::uint32_t k = 0; k < points.size(); ++k) {
     if (original[k] == k) {
       originals.push_back(k);
@@ -249,20 +269,21 @@ void SeparateSecondExport(NestedPoints& points) {
   constexpr double kStepsPerSpacing = 2.5;  // on the curve through evenly spread points
   const CurveSteps steps(points);
   const auto reach = [&](std::size_t k) { return kPlace / kStepsPerSpacing * steps.At(k); };
+  const std::size_t before = CountNearCopies(points), enough = (points.size() + before) / kOneIn;
   std::size_t close = 0;
   for (std::size_t k = 1; k < points.size(); ++k) {
     close += PlaceDistance(points, k - 1, k) <= reach(k) ? 1 : 0;
   }
-  if (close < points.size() / kOneIn / 2) {  // half of the pairs are at least next on the curve
+  if (before + close < enough / 2) {  // half of the pairs are at least next on the curve
     return;
   }
   const Originals original = FindCopies(
       points, reach, [&](std::size_t a, std::size_t b) { return HaveOneWeight(points, a, b); });
-  std::size_t copies = 0;
+  std::size_t copies = before;
   for (std::size_t k = 0; k < points.size(); ++k) {
     copies += original[k] != k ? 1 : 0;
   }
-  if (copies > points.size() / kOneIn && ShareTheirErrors(points, original)) {
+  if (copies > enough && ShareTheirErrors(points, original)) {
     SeparateCopies(original, points);
   }
 }

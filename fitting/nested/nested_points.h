@@ -94,9 +94,10 @@ inline double PlaceDistance(const NestedPoints& points, std::size_t a, std::size
 // - points nearer to another than a thousandth of the points' spacing, whose displacements differ
 // by
 //   less than a thousandth of the range around them;
-// - points nearer than a twentieth of the spacing, if they are at least a sixth of all points and
-//   differ from their neighbour by less than half of the noise. They then share its error, as in a
-//   second export, and would make the noise look smaller. Points that were measured twice stay.
+// - points nearer than a twentieth of the spacing, if such points and near copies are at least a
+//   sixth of all points and most differ from their neighbour by less than half of the noise. They
+//   then share its error, as in a second export or twins of stations, and would make the noise look
+//   smaller. Points that were measured twice stay.
 NestedPoints DisplacementsFrom(const HSplineSurface& start, const ScatteredPoints& points,
                                int threads);
 // Makes the points of a nested fit in the memory of the given points.

@@ -380,6 +380,27 @@ TEST(PointFit, ASecondExportCountsOnce) {
   }
 }
 
+// Stations with twins: most copies repeat the value, some differ. The few that differ must not stay
+// as points of their own, where they would make the surface steep.
+TEST(PointFit, TwinsOfStationsCountOnce) {
+  const PointTable once = Hills(600, 100, 0.2, 3);
+  PointTable twins = once;
+  Random random(5);
+  for (const Vec3& p : once.positions) {
+    const int copies = static_cast<int>(random.Uniform(0, 4));
+    for (int k = 0; k < copies; ++k) {
+      const double moved = random.Uniform() < 0.05 ? 0.3 * random.Normal() : 0;
+      twins.positions.push_back(p + Vec3(1e-6 * random.Normal(), 1e-6 * random.Normal(), moved));
+    }
+  }
+  const PointFit alone = FitPoints(once, {}, {}), fit = FitPoints(twins, {}, {});
+  // A few stations are neighbours by chance; some fifty copies have another value.
+  EXPECT_NEAR(fit.fit.automatic->near_copies,
+              static_cast<double>(twins.positions.size() - once.positions.size()), 10);
+  EXPECT_NEAR(fit.fit.automatic->noise_mm, 0.2, 0.03);
+  EXPECT_LT(ErrorOfHills(fit.fit.surface), 1.3 * ErrorOfHills(alone.fit.surface));
+}
+
 // Two measurements at one place have errors of their own.
 TEST(PointFit, PointsThatWereMeasuredTwiceBothCount) {
   PointTable twice = Hills(1000, 100, 0, 3);
