@@ -190,28 +190,35 @@ double DesignEffect::Value() const {
              : largest;
 }
 
-bool StandTogether(const std::vector<char>& outlier) {
-  constexpr std::ptrdiff_t kAround = 4;  // on each side
-  constexpr int kFewest = 20;
-  constexpr double kBeyondChance = 0.3;
-  const auto count = std::ssize(outlier);
-  int outliers = 0, together = 0;
-  for (std::ptrdiff_t k = 0; k < count; ++k) {
-    if (outlier[k] == 0) {
-      continue;
+namespace {
+
+constexpr std::ptrdiff_t kAround = 4;  // points of the curve on each side of an outlier
+
+}  // namespace
+
+std::vector<std::uint32_t> FindOutliersTogether(const std::vector<char>& outlier) {
+  std::vector<std::uint32_t> together;
+  for (std::ptrdiff_t k = 0; k < std::ssize(outlier); ++k) {
+    const auto begin = outlier.begin() + std::max<std::ptrdiff_t>(k - kAround, 0),
+               end = outlier.begin() + std::min(k + kAround + 1, std::ssize(outlier));
+    if (outlier[k] != 0 && std::count(begin, end, 1) > 1) {
+      together.push_back(static_cast<std::uint32_t>(k));
     }
-    ++outliers;
-    bool is_together = false;
-    for (std::ptrdiff_t n = std::max<std::ptrdiff_t>(k - kAround, 0);
-         n < std::min(k + kAround + 1, count); ++n) {
-      is_together = is_together || (n != k && outlier[n] != 0);
-    }
-    together += is_together ? 1 : 0;
   }
-  const double share = static_cast<double>(outliers) /
-                       static_cast<double>(std::max<std::ptrdiff_t>(count, 1)),
+  return together;
+}
+
+bool StandTogether(const std::vector<char>& outlier) {
+  constexpr double kFewest = 20;
+  constexpr double kBeyondChance = 0.3;
+  const auto outliers = static_cast<double>(std::ranges::count(outlier, 1));
+  if (outliers < kFewest) {
+    return false;
+  }
+  const double share = outliers / static_cast<double>(outlier.size()),
                by_chance = 1 - std::pow(1 - share, 2 * kAround);
-  return outliers >= kFewest && together > (by_chance + kBeyondChance) * outliers;
+  return static_cast<double>(FindOutliersTogether(outlier).size()) >
+         (by_chance + kBeyondChance) * outliers;
 }
 
 }  // namespace semblance::fitting

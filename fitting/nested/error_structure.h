@@ -64,5 +64,7 @@ class DesignEffect {
 // Returns whether far more outliers have another one among the eight points next to them on the
 // curve than by chance, as on a ridge that is narrower than the points' spacing.
 bool StandTogether(const std::vector<char>& outlier);
+// The outliers that have another one there, ascending.
+std::vector<std::uint32_t> FindOutliersTogether(const std::vector<char>& outlier);
 
 }  // namespace semblance::fitting
