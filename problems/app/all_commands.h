@@ -12,6 +12,7 @@ namespace semblance::problems {
 std::span<const ProgramCommand> RunCommands();         // run, depth, import-ct, check, options ...
 std::span<const ProgramCommand> FitCommands();         // fit: any scattered points
 std::span<const ProgramCommand> StudyCommands();       // study, submit, merge, compare, status
+std::span<const ProgramCommand> RaterCommands();       // raters
 std::span<const ProgramCommand> FaceCommands();        // edit, export, prior, feature
 std::span<const ProgramCommand> LandmarkCommands();    // landmarks
 std::span<const ProgramCommand> TemplateCommands();    // template, recentre

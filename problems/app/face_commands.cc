@@ -19,6 +19,7 @@
 #include "problems/face/template_source.h"
 #include "problems/io/given_files.h"
 #include "problems/report/export_file.h"
+#include "problems/report/turntable.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/feature.h"
@@ -105,6 +106,24 @@ int Export(const FaceArguments& a) try {
   return kDone;
 } catch (const InputError& error) {
   throw WithFileName(error, a.face);
+}
+
+struct TurntableArguments {
+  std::string run;
+  TurntableOptions options;
+  WorkOptions work;
+};
+
+int TurntableCommand(const TurntableArguments& a) {
+  const Turntable table = MakeTurntable(a.run, a.options, MakeRunContext(a.work));
+  StagedFolder folder = MakeStagedFolder(a.work, "", {.files = {fs::path(a.run) / "scene.json"}});
+  folder.Files().Write("turntable.glb", table.glb);
+  for (const TurntableFrame& frame : table.frames) {
+    folder.Files().Write(frame.name, frame.png);
+  }
+  folder.Publish();
+  Tell("{}: turntable.glb and {} frames\n", folder.Root().string(), table.frames.size());
+  return kDone;
 }
 
 int Store(const Feature& feature, const FaceArguments& a, std::span<const fs::path> given) {
@@ -245,6 +264,20 @@ void DeclareExport(CLI::App& to, CommandLine& line) {
   AddForce(to, a);
 }
 
+void DeclareTurntable(CLI::App& turntable, CommandLine& line) {
+  TurntableArguments& a = *Bind(turntable, line, &TurntableCommand);
+  turntable.add_option("RUN", a.run, "folder of a run")->required();
+  turntable.add_option("--frames", a.options.frames, "pictures of one turn [36]")
+      ->check(CLI::Range(1, 720));
+  turntable.add_option("--seconds", a.options.seconds, "time of one turn in turntable.glb [8]")
+      ->check(Finite());
+  turntable.add_option("--height_px", a.options.height_px, "height of a picture in pixels [640]")
+      ->check(CLI::Range(64, 2160));
+  AddOutput(turntable, a.work);
+  turntable.get_option("--out")->required();
+  AddWork(turntable, line, a.work);
+}
+
 void DeclareExtract(CLI::App& extract, CommandLine& line) {
   FaceArguments& a = *Bind(extract, line, &ExtractCommand);
   AddFace(extract, a);
@@ -350,6 +383,8 @@ std::span<const ProgramCommand> FaceCommands() {
   static constexpr std::array kCommands = {
       ProgramCommand{"edit", "move vertices of an H-spline face by a script", &DeclareEdit},
       ProgramCommand{"export", "write a face, a mesh or a run for other programs", &DeclareExport},
+      ProgramCommand{"turntable", "make a turning skull and face as .glb and pictures",
+                     &DeclareTurntable},
       ProgramCommand{"prior", "transfer the modes of a face model to the H-spline of its mean",
                      &DeclarePrior},
       ProgramCommand{"feature", "transfer detail from one face to another (thesis 4.3)",

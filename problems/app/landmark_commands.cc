@@ -102,7 +102,7 @@ struct ProposeArguments {
   std::string skull, landmarks, out, compare;
   std::vector<std::pair<std::string, std::string>> references;  // skull, landmarks
   int threads = DefaultThreads();
-  bool force = false, quiet = false;
+  bool force = false, quiet = false, upright = false;
   std::stop_token stop;
 };
 
@@ -118,9 +118,10 @@ Proposal MakeProposal(const ProposeArguments& a, const TriMesh& skull, const Lan
                       const RunContext& context) {
   std::vector<SitePoint> points = known.Points();
   std::erase_if(points, [](const SitePoint& p) { return !IsStandardSite(p.site); });
+  const SkullLies lies = a.upright ? SkullLies::kUpright : SkullLies::kAnyhow;
   return a.references.empty()
-             ? ProposeLandmarks(skull, a.skull, ReadMeanSkull(), context, points)
-             : ProposeLandmarks(skull, a.skull, ReadReferences(a), context, points);
+             ? ProposeLandmarks(skull, a.skull, ReadMeanSkull(), context, points, lies)
+             : ProposeLandmarks(skull, a.skull, ReadReferences(a), context, points, lies);
 }
 
 // The given landmarks first, as they are, then the proposed ones. A file that holds both is marked
@@ -205,6 +206,9 @@ void DeclarePropose(CLI::App& propose, CommandLine& line) {
                      "points of this skull that a person has placed; they stay, and the others are "
                      "proposed from them. Three that are apart (n, zy_l, zy_r) replace the search "
                      "for the pose");
+  propose.add_flag("--upright", a.upright,
+                   "the skull is from a scan that stated its axes: only upright poses are tried, "
+                   "which finds the pose of coarse and cut skulls");
   propose.add_option("--out", a.out, "file for the proposal [out/SKULL_proposed.yaml]");
   propose.add_option(
       "--compare", a.compare,

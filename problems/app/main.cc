@@ -93,9 +93,10 @@ int ParseAndRun(int argc, char** argv) {
   app.set_version_flag("--version", "semblance " SEMBLANCE_VERSION);
   app.require_subcommand(1);
   CommandLine line{.stop = StopOnSignals(), .chosen = {}};
-  for (const auto& commands : {RunCommands(), FitCommands(), StudyCommands(), FaceCommands(),
-                               LandmarkCommands(), TemplateCommands(), PopulationCommands(),
-                               PhantomCommands(), WorkbenchCommands(), ShellCommands()}) {
+  for (const auto& commands :
+       {RunCommands(), FitCommands(), StudyCommands(), RaterCommands(), FaceCommands(),
+        LandmarkCommands(), TemplateCommands(), PopulationCommands(), PhantomCommands(),
+        WorkbenchCommands(), ShellCommands()}) {
     Declare(commands, app, line);
   }
   try {

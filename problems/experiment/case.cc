@@ -9,6 +9,7 @@
 #include "problems/experiment/extra_dowels.h"
 #include "problems/experiment/limit_depths.h"
 #include "problems/subject/condition_depths.h"
+#include "problems/subject/head_planes.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/network_plan.h"
@@ -111,6 +112,10 @@ LandmarkFile Load(const CtSubject& options, Landmarking landmarking, SubjectData
   subject.voxel_mm = std::max({reading.volume.spacing_mm.maxCoeff(),
                                options.import.coarsen.pixel_mm, options.import.coarsen.slice_mm});
   Mirror(options.mirror, landmarks, subject, context);
+  for (const HeadPlane& plane : HeadPlanes(landmarks.Points())) {
+    constexpr double kPixel_mm = 0.75;
+    subject.slices.push_back(SampleSlice(reading.volume, plane.plane, plane.name, kPixel_mm));
+  }
   return landmarks;
 }
 
@@ -215,15 +220,18 @@ Case StartCase(const SubjectData& data, const Experiment& experiment, const Mesh
                .network = {},
                .scored_on_bone = {},
                .scored_network = {},
+               .turns_deg = {},
                .points = {},
                .basis = {},
                .bounds = StartEffects(experiment.tissue.bounds),
+               .slices = data.slices,
                .notes = data.notes,
                .inputs = data.inputs};
   if (measured) {
     Append(subject.notes, CheckLandmarks(data, query, experiment.landmarks));
   }
   subject.dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks);
+  subject.turns_deg = TurnsOfDowels(data.landmarks, data.skull, query, experiment.landmarks);
   for (const Landmark& landmark : data.landmarks.landmarks) {
     subject.points[landmark.site] = landmark.Position();
   }

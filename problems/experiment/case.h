@@ -11,6 +11,7 @@
 #include "interp/dowels/dowel_network.h"
 #include "problems/experiment/experiment.h"
 #include "problems/experiment/metrics/face_details.h"
+#include "problems/io/volumes/grey_slice.h"
 #include "problems/subject/mirror.h"
 
 namespace semblance::problems {
@@ -24,6 +25,7 @@ struct SubjectData {
   std::vector<std::string> notes;
   std::vector<std::filesystem::path> inputs;  // files that were read
   double voxel_mm = kNaN;  // of a CT: the largest distance of neighbouring voxels, as imported
+  std::vector<GreySlice> slices = {};  // of a CT, in HeadPlanes (head_planes.h)
 };
 
 struct Case {
@@ -37,10 +39,12 @@ struct Case {
   DowelNetwork network;                 // of dowels_on_bone
   std::vector<Dowel> scored_on_bone;    // at all sites, whatever sites the experiment uses
   DowelNetwork scored_network;          // of scored_on_bone; depths are compared in front of it
-  std::map<std::string, Vec3> points;   // all landmarks as given, with or without depth, mm
-  ScoreBasis basis;                     // the landmarks as given; they decide what is scored
-  std::vector<BoundEffect> bounds;      // one per entry of tissue.bounds
-  std::vector<std::string> notes;       // for readers of the result, one line each
+  std::map<std::string, double> turns_deg = {};  // of dowels with a given direction (TurnsOfDowels)
+  std::map<std::string, Vec3> points;            // all landmarks as given, with or without depth, mm
+  ScoreBasis basis;                              // the landmarks as given; they decide what is scored
+  std::vector<BoundEffect> bounds;               // one per entry of tissue.bounds
+  std::vector<GreySlice> slices = {};            // of a CT, in HeadPlanes (head_planes.h)
+  std::vector<std::string> notes;                // for readers of the result, one line each
   std::vector<std::filesystem::path> inputs;  // for the manifest
 };
 

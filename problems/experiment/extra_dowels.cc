@@ -79,12 +79,18 @@ class Placing {
   std::optional<HSplineSurface> face_;
 };
 
-Dowel OnBone(const std::string& name, const Vec3& point, const SubjectData& data,
-             const MeshQuery& skull, const PlaceOptions& options) {
+Dowel OnBone(const std::string& name, const Vec3& point, const ExtraSite& site,
+             const SubjectData& data, const MeshQuery& skull, const PlaceOptions& options,
+             std::map<std::string, double>& turns_deg) {
   LandmarkFile alone{.subject = data.landmarks.subject, .landmarks = {}, .absent = {}};
   Landmark& landmark = alone.landmarks.emplace_back();
   landmark.site = name;
   landmark.point = {point.x(), point.y(), point.z()};
+  if (site.direction) {
+    const Vec3 unit = Vec3(site.direction->data()).normalized();
+    landmark.normal = {unit.x(), unit.y(), unit.z()};
+  }
+  turns_deg.merge(TurnsOfDowels(alone, data.skull, skull, options));
   Dowel dowel = PlaceDowels(alone, data.skull, skull, options).front();
   dowel.role = IsKnown(name) ? PointRole::kLandmark : PointRole::kInserted;
   return dowel;
@@ -127,6 +133,11 @@ std::string TableWith(const TissueOptions& tissue, const std::string& site) {
 bool IsLandmark(const std::string& name, const ExtraSite& site, const LandmarkFile& file) {
   if (FindLandmark(file, name) == nullptr) {
     return false;
+  }
+  if (site.direction) {
+    throw InputError(fmt::format(
+        "sites.{}.direction: {} is among the landmarks; give that landmark a `normal` instead",
+        name, DescribeSite(name)));
   }
   if (!site.near.IsNull()) {
     throw InputError(fmt::format(
@@ -282,7 +293,8 @@ void InsertDowels(const Experiment& experiment, const SubjectData& data, const M
           "sites.{}: {} is not among the landmarks; place it there, or give `near` or `uv`", name,
           DescribeSite(name)));
     }
-    Dowel dowel = OnBone(name, placing.At(name, site), data, skull, experiment.landmarks);
+    Dowel dowel = OnBone(name, placing.At(name, site), site, data, skull, experiment.landmarks,
+                         subject.turns_deg);
     CheckApart(dowel, subject.dowels_on_bone);
     CheckApart(dowel, inserted);
     inserted.push_back(std::move(dowel));

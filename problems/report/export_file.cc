@@ -3,16 +3,13 @@
 
 #include <fmt/format.h>
 
-#include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
 #include <vector>
 
-#include "problems/report/view/view_mesh.h"
+#include "problems/report/scene_file.h"
 #include "surfaces/base/atomic_file.h"
-#include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
-#include "surfaces/base/json_text.h"
 #include "surfaces/base/lower_case.h"
 #include "surfaces/hspline_files/face_export.h"
 #include "surfaces/hspline_files/hspline_json.h"
@@ -26,7 +23,6 @@ namespace semblance::problems {
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 // ---------------------------------------------------------------------------------------------
 // A mesh with the values of its vertices
@@ -103,20 +99,12 @@ GlbPart MakePart(const TriMesh& mesh, const GlbMaterial& material) {
 }
 
 GlbNode SkullNode(const fs::path& file) {
-  try {
-    const Json scene = ParseJson(ReadFileBytes(file), file.string());
-    for (const Json& layer : scene.at("layers")) {
-      if (layer.at("id") == "skull") {
-        const Json& blob = scene.at("blobs").at(layer.at("mesh").get<std::string>());
-        return {.name = "skull", .parts = {MakePart(DecodeMeshBlob(blob), kBone)}};
-      }
-    }
-  } catch (const Json::exception& e) {
-    throw IoError(fmt::format("{}: not the scene of a run: {}", file.string(), JsonFault(e)));
-  } catch (const InputError& e) {
-    throw IoError(fmt::format("{}: {}", file.string(), e.what()));
+  const std::vector<SceneMesh> meshes = ReadSceneMeshes(file);
+  const SceneMesh* const skull = FindSceneMesh(meshes, "skull");
+  if (skull == nullptr) {
+    throw IoError(fmt::format("{}: it holds no skull", file.string()));
   }
-  throw IoError(fmt::format("{}: it holds no skull", file.string()));
+  return {.name = "skull", .parts = {MakePart(skull->mesh, kBone)}};
 }
 
 GlbNode FaceNode(const fs::path& file) {
@@ -126,40 +114,21 @@ GlbNode FaceNode(const fs::path& file) {
   return {.name = "face", .parts = {std::move(part)}};
 }
 
-Vec3 ReadPoint(const CsvReader& csv, const char* name) {
-  Vec3 point;
-  for (const int axis : {0, 1, 2}) {
-    point[axis] = csv.NumberOrNan(csv.RequireColumn(fmt::format("{}_{}_mm", name, "xyz"[axis])));
-  }
-  return point;
-}
-
 GlbNode DowelsNode(const fs::path& file) {
   constexpr double kRod_mm = 0.9, kEnd_mm = 1.5;
   constexpr int kSides = 12, kRings = 6;
-  const std::string text = ReadFileBytes(file);
-  CsvReader csv(text, file.string());
   GlbNode dowels{.name = "dowels"};
-  while (csv.NextRow()) {
-    const Vec3 base = ReadPoint(csv, "base"), tip = ReadPoint(csv, "tip");
-    if (!base.allFinite() || !tip.allFinite() || base == tip) {
-      continue;  // without a depth
-    }
-    TriMesh rod = MakeCylinder(base, tip, kRod_mm, kSides);
-    Append(rod, MakeSphere(tip, kEnd_mm, kRings));
-    dowels.children.push_back({.name = fmt::format("dowel {}", csv.Cell(csv.RequireColumn("site"))),
-                               .parts = {MakePart(rod, kRod)}});
+  for (const Dowel& dowel : ReadRunDowels(file)) {
+    TriMesh rod = MakeCylinder(dowel.base, dowel.Tip(), kRod_mm, kSides);
+    Append(rod, MakeSphere(dowel.Tip(), kEnd_mm, kRings));
+    dowels.children.push_back(
+        {.name = fmt::format("dowel {}", dowel.site), .parts = {MakePart(rod, kRod)}});
   }
   return dowels;
 }
 
 std::string RunGlb(const fs::path& folder) {
-  if (!fs::exists(folder / "result.json") || !fs::exists(folder / "scene.json")) {
-    throw IoError(fmt::format(
-        "{}: not the folder of a run, because result.json or scene.json is missing; make one with "
-        "semblance run",
-        folder.string()));
-  }
+  CheckRunFolder(folder);
   const std::vector<GlbNode> nodes = {SkullNode(folder / "scene.json"),
                                       FaceNode(folder / "face.ply"),
                                       DowelsNode(folder / "dowels.csv")};

@@ -19,6 +19,7 @@
 #include "problems/report/run_pictures.h"
 #include "problems/report/run_report.h"
 #include "problems/report/scene_json.h"
+#include "problems/report/section_pictures.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/parallel.h"
@@ -41,14 +42,16 @@ int TargetIndex(const FitTarget& target, const std::string& site) {
 std::string DowelsCsv(const RunResult& result) {
   CsvWriter csv({"site", "base_x_mm", "base_y_mm", "base_z_mm", "direction_x", "direction_y",
                  "direction_z", "depth_mm", "sd_mm", "tip_x_mm", "tip_y_mm", "tip_z_mm", "u", "v",
-                 "fit_residual_mm", "role"});
+                 "fit_residual_mm", "role", "turned_deg"});
   for (const Dowel& d : result.subject.dowels_on_bone) {
     const int index = TargetIndex(result.target, d.site);
     const Vec2 uv = index < 0 ? Vec2(kNaN, kNaN) : result.fit.uv[index];
     const Vec3 tip = d.Tip();
+    const auto turn = result.subject.turns_deg.find(d.site);
     csv.Row(d.site, d.base.x(), d.base.y(), d.base.z(), d.direction.x(), d.direction.y(),
             d.direction.z(), d.depth_mm, d.sd_mm, tip.x(), tip.y(), tip.z(), uv.x(), uv.y(),
-            index < 0 ? kNaN : result.fit.residual_mm[index], RoleName(d));
+            index < 0 ? kNaN : result.fit.residual_mm[index], RoleName(d),
+            turn == result.subject.turns_deg.end() ? kNaN : turn->second);
   }
   return csv.Text();
 }
@@ -193,7 +196,10 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
     folder.Write("seeds.csv", SeedsCsv(result));
     WriteMeshes(result, folder, context);
   });
-  step("write pictures", [&] { WritePictures(result, folder, context); });
+  step("write pictures", [&] {
+    WritePictures(result, folder, context);
+    WriteSections(result, folder);
+  });
   step("write 3-D view", [&] { folder.Write("scene.json", SceneJson(result, context)); });
   const Json provenance = step("hash inputs", [&] { return Provenance(experiment, result); });
   step("write report", [&] {

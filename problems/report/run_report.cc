@@ -17,6 +17,7 @@
 #include "problems/report/report_kit.h"
 #include "problems/report/run_pictures.h"
 #include "problems/report/scene_json.h"
+#include "problems/report/section_pictures.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/csv.h"
 #include "surfaces/base/error.h"
@@ -232,6 +233,29 @@ ReportTable DowelsTable(const std::filesystem::path& file) {
   return table;
 }
 
+// "Turned from the bone's own direction: Gonion, left, by 23 degrees." Empty if no dowel is turned
+// by 5 degrees or more: normals of other programs differ by less. Folders of older versions have no
+// such column.
+std::vector<std::string> TurnedDowels(const std::filesystem::path& file) {
+  constexpr double kNotable_deg = 5;
+  const std::string text = ReadFileBytes(file);
+  CsvReader csv(text, file.string());
+  const auto turned = csv.Find("turned_deg");
+  std::vector<std::string> sites;
+  while (turned && csv.NextRow()) {
+    const double turn_deg = csv.NumberOrNan(*turned);
+    if (turn_deg >= kNotable_deg) {
+      sites.push_back(fmt::format("{} by {:.0f}\u00b0",
+                                  WordsOfSite(csv.Cell(csv.RequireColumn("site"))), turn_deg));
+    }
+  }
+  if (sites.empty()) {
+    return {};
+  }
+  return {fmt::format("Markers whose given direction is turned from the bone's own: {}.",
+                      fmt::join(sites, "; "))};
+}
+
 ReportTable CountsTable(const std::string& caption, const Json& values) {
   ReportTable table{caption, {"quantity", "value"}};
   for (const auto& [name, value] : values.items()) {
@@ -342,6 +366,16 @@ ReportSection PictureSection(const OutputFolder& folder) {
         fmt::format("from three sides: {}", picture.caption), picture.legends));
   }
   return section;
+}
+
+// Empty for folders of older versions and for skulls whose landmarks define no planes.
+ReportSection CrossSections(const OutputFolder& folder) {
+  return {.heading = "Cross-sections",
+          .paragraphs = {"Skull and faces, cut by planes at landmarks. The axes are those of an "
+                         "average skull that was fitted to the landmarks. Where the run read a CT, "
+                         "its grey values are behind the outlines."},
+          .images = SectionImages(folder),
+          .folded = true};
 }
 
 std::string Words(const Json& list, const char* between) {
@@ -607,10 +641,14 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
     sections.push_back({.heading = "Plausibility", .tables = {std::move(checks)}, .folded = true});
   }
   sections.push_back(PictureSection(folder));
+  if (ReportSection cuts = CrossSections(folder); !cuts.images.empty()) {
+    sections.push_back(std::move(cuts));
+  }
   if (IsPartlyInvented(result)) {
     sections.push_back(BoneSection(result.at("bone"), folder));
   }
   sections.push_back({.heading = "Depth at the landmarks",
+                      .paragraphs = TurnedDowels(folder.Root() / "dowels.csv"),
                       .tables = {DowelsTable(folder.Root() / "dowels.csv")},
                       .folded = true});
   sections.push_back(FitSection(result.at("fit"), folder));

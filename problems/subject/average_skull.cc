@@ -187,9 +187,9 @@ SkullFit FitAverageSkull(std::span<const SitePoint> sites, Handedness hand) {
 }
 
 PoseAxes FindPoseAxes(const Mat3& skull_from_average) {
-  constexpr double kMaxTurn_deg = 60;
+  constexpr double kUprightWithin_deg = 60;
   const auto is_upright = [](const Mat3& r) {
-    return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi <= kMaxTurn_deg;
+    return Eigen::AngleAxisd(r).angle() * 180 / std::numbers::pi <= kUprightWithin_deg;
   };
   if (is_upright(skull_from_average)) {
     return PoseAxes::kLps;

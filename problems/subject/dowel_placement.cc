@@ -217,6 +217,36 @@ void Keep(const LandmarkFile& all, const LandmarksKept& kept, UsedLandmarks& use
 
 }  // namespace
 
+std::map<std::string, double> TurnsOfDowels(const LandmarkFile& file, const TriMesh& skull,
+                                            const MeshQuery& query, const PlaceOptions& options) {
+  std::map<std::string, double> turns_deg;
+  for (const Landmark& landmark : file.landmarks) {
+    if (!landmark.normal) {
+      continue;
+    }
+    const MeshPoint base = query.Closest(landmark.Position());
+    const Vec3 own =
+        AveragedNormal(skull, base.triangle, {base.position, options.normal_radius_mm});
+    if (own.isZero()) {
+      continue;
+    }
+    const Vec3 direction = Vec3(landmark.normal->data()).normalized();
+    const double turn_deg =
+        std::atan2(own.cross(direction).norm(), own.dot(direction)) * 180 / std::numbers::pi;
+    if (turn_deg > kMaxTurn_deg) {
+      throw InputError(
+          fmt::format("{}: site {}: its direction is turned by {:.0f} degrees from the bone's own, "
+                      "so the dowel "
+                      "would run along the bone or into the head; at most {:.0f} are allowed; turn "
+                      "it outwards, "
+                      "or leave the direction out",
+                      FileLabel(file), DescribeSite(landmark.site), turn_deg, kMaxTurn_deg));
+    }
+    turns_deg[landmark.site] = turn_deg;
+  }
+  return turns_deg;
+}
+
 std::vector<bool> KeptSites(const LandmarksKept& kept, std::span<const std::string> sites,
                             std::span<const Vec3> points) {
   return std::visit([&](const auto& o) { return Kept(o, sites, points); }, kept);

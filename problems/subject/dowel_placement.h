@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <span>
 #include <string>
 #include <string_view>
@@ -159,6 +160,14 @@ std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
                                const MeshQuery& query, const PlaceOptions& options);
 std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
                                const PlaceOptions& options);
+
+// The angles, in degrees, between the normals that the file gives and AveragedNormal at the dowels'
+// bases, by site: by how much a person, or another program, has turned each dowel. Sites without a
+// normal, or on bone without area, are left out. Throws InputError for a normal that is more than
+// kMaxTurn_deg off, because the dowel would run along the bone or into the head.
+inline constexpr double kMaxTurn_deg = 75;
+std::map<std::string, double> TurnsOfDowels(const LandmarkFile& file, const TriMesh& skull,
+                                            const MeshQuery& query, const PlaceOptions& options);
 
 // The unit mean normal, weighted by area, of the mesh inside `ball`. Only triangles count that are
 // connected there with the triangle `first` and face within 80 degrees of it, so that the inner

@@ -77,8 +77,9 @@ std::vector<OptionFault> SiteOptionFaults(const ExtraSites& sites) {
       faults.push_back({name, complaint});
     } else if (!complaint.empty() && !placed) {
       faults.push_back({name, complaint + " (a site of your own needs `near` or `uv`)"});
-    } else if (!placed && !site.depth && !site.hold) {
-      faults.push_back({name, "the site has no options; give `uv`, `near`, `depth` or `hold`"});
+    } else if (!placed && !site.depth && !site.direction && !site.hold) {
+      faults.push_back(
+          {name, "the site has no options; give `uv`, `near`, `depth`, `direction` or `hold`"});
     }
   }
   return faults;

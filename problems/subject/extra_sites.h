@@ -20,6 +20,7 @@ struct ExtraSite {
   std::optional<std::array<double, 2>> uv;
   ConfigNode near;  // see ReadPlace; null: not given
   std::optional<AutoOr<double>> depth;
+  std::optional<std::array<double, 3>> direction;
   bool hold = false;
 };
 
@@ -46,6 +47,10 @@ void Fields(Visitor& visit, ExtraSite& o) {
                   .doc = "tissue depth; auto: the interpolated depth (a dowel for the fit only); "
                          "without it a table's depth at the site"},
         o.depth);
+  visit(FieldInfo{.name = "direction",
+                  .doc = "direction of an inserted dowel, out of the bone, of any length, in LPS; "
+                         "without it the bone's mean normal; at most 75 degrees from it"},
+        o.direction);
   visit(FieldInfo{.name = "hold", .doc = "true: relaxation does not move the site's (u,v)"},
         o.hold);
 }
@@ -62,6 +67,9 @@ template <class Report>
 void CheckValue(Report& report, const ExtraSite& site) {
   if (site.uv && !site.near.IsNull()) {
     report("near", "the place of the site is given twice, as `uv` and as `near`; give one of them");
+  }
+  if (site.direction && !(Vec3(site.direction->data()).norm() > 0)) {
+    report("direction", "has no length; write [x, y, z] out of the bone, or leave it out");
   }
   if (!site.near.IsNull()) {
     if (const std::string fault = ReadPlace(site.near).fault; !fault.empty()) {

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <string_view>
 
@@ -83,6 +84,13 @@ class GlbWriter {
       const std::size_t number = json_["nodes"].size();
       numbers.push_back(number);
       json_["nodes"].push_back({{"name", node.name}});
+      if (!node.offset_mm.isZero()) {
+        const Eigen::Vector3f t = ToGltf(node.offset_mm / 1000);
+        json_["nodes"][number]["translation"] = {t.x(), t.y(), t.z()};
+      }
+      if (node.turn_s) {
+        Turn(number, node);
+      }
       if (!node.parts.empty()) {
         json_["nodes"][number]["mesh"] = Mesh(node);
       }
@@ -92,6 +100,36 @@ class GlbWriter {
       }
     }
     return numbers;
+  }
+
+  // Rotations in steps of an eighth, because viewers take the shorter way from one to the next.
+  void Turn(std::size_t number, const GlbNode& node) {
+    constexpr int kSteps = 8;
+    if (!(*node.turn_s > 0)) {
+      throw InputError(fmt::format("glTF '{}': a turn of {} s; a time above 0 is needed", node.name,
+                                   *node.turn_s));
+    }
+    std::string times, rotations;
+    for (int k = 0; k <= kSteps; ++k) {
+      const double half_angle = -std::numbers::pi * k / kSteps;  // about +y
+      AppendFloat(times, static_cast<float>(*node.turn_s * k / kSteps));
+      for (const double x : {0.0, std::sin(half_angle), 0.0, std::cos(half_angle)}) {
+        AppendFloat(rotations, static_cast<float>(x));
+      }
+    }
+    const std::size_t input = Accessor(times, kFloat, kSteps + 1, "SCALAR", std::nullopt);
+    json_["accessors"][input]["min"] = {0};
+    json_["accessors"][input]["max"] = {static_cast<float>(*node.turn_s)};
+    AddChannel(number, input, Accessor(rotations, kFloat, kSteps + 1, "VEC4", std::nullopt));
+  }
+
+  void AddChannel(std::size_t node, std::size_t times, std::size_t rotations) {
+    Json& animation = json_["animations"][0];
+    animation["name"] = "turn";
+    animation["samplers"].push_back(
+        {{"input", times}, {"output", rotations}, {"interpolation", "LINEAR"}});
+    animation["channels"].push_back({{"sampler", animation["samplers"].size() - 1},
+                                     {"target", {{"node", node}, {"path", "rotation"}}}});
   }
 
   std::size_t Mesh(const GlbNode& node) {
@@ -210,7 +248,7 @@ class GlbWriter {
   }
 
   std::size_t Accessor(const std::string& bytes, int component, std::size_t count, const char* type,
-                       int target) {
+                       std::optional<int> target) {
     json_["accessors"].push_back({{"bufferView", View(bytes, target)},
                                   {"componentType", component},
                                   {"count", count},

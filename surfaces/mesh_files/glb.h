@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -34,16 +35,20 @@ struct GlbNode {
   std::string name;
   std::vector<GlbPart> parts = {};
   std::vector<GlbNode> children = {};
+  Vec3 offset_mm = Vec3::Zero();      // from the parent's origin, LPS
+  std::optional<double> turn_s = {};  // turns about its vertical axis, once in so many seconds
 };
 
 // True if the bytes can be a texture: the first ones are those of a PNG or a JPEG.
 bool IsGlbPicture(std::string_view bytes);
 
-// Writes the nodes as one scene in metres, with +y up, the face towards +z and the subject's left
-// at +x, in single precision. Equal materials and textures are written once. Surfaces are visible
-// from both sides. A normal of zero becomes (0, 0, 1) because glTF allows no zero normals. Throws
-// InputError for a part without triangles, with another number of normals, uv or colours than
-// points, or with a texture that is neither PNG nor JPEG.
+// Writes the nodes as one scene with, if a node turns, one animation named "turn": the subject's
+// left side comes to the front first. Lengths are in metres, with +y up, the face towards +z and
+// the subject's left at +x, in single precision. Equal materials and textures are written once.
+// Surfaces are visible from both sides. A normal of zero becomes (0, 0, 1) because glTF allows no
+// zero normals. Throws InputError for a turn that does not take a positive time, a part without
+// triangles, with another number of normals, uv or colours than points, or with a texture that is
+// neither PNG nor JPEG.
 std::string EncodeGlb(std::span<const GlbNode> nodes);
 
 }  // namespace semblance::surfaces

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Landmarks: a list of the sites, details of the chosen site, and clicks on the bone.
+import {dowelHandle} from './dowel_handle.js';
 import {button, element, field, lines, millimetres, select} from './dom.js';
 import {chooser} from './opener.js';
 import {act, choose, download, landmarkOf, nameOf, onChoice, siteOf, store} from './store.js';
@@ -86,11 +87,12 @@ async function confirm(code) {
   if (await act('confirm', {site: code}) && toReview().length) { choose(toReview()[0].site); }
 }
 
-function detail(code) {
+function detail(code, handle) {
   if (!code) {
-    return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. Click on a ball to choose its site; drag a ball to move it. Keys: P places the site in the middle of the view, W A S D move it by 1 mm (with Shift 0.2 mm), Enter confirms it, N goes to the next, Delete removes it.'})];
+    return [element('p', {className: 'soft', textContent: 'Choose a site, then click on the bone. Click on a ball to choose its site; drag a ball to move it. Keys: P places the site in the middle of the view, W A S D move it by 1 mm (with Shift 0.2 mm), I J K L turn its dowel by 3\u00b0 (with Shift 1\u00b0), Enter confirms it, N goes to the next, Delete removes it.'})];
   }
   const site = siteOf(code), landmark = landmarkOf(code);
+  const direction = element('p', {className: 'soft direction', textContent: landmark ? handle.words() : ''});
   const checks = landmark ? Object.keys(MEANINGS).filter((check) => landmark[check] !== null && landmark[check] !== undefined)
       .map((check) => element('li', {className: landmark[check] > DOUBTFUL[check] ? 'bad' : ''},
           element('strong', {textContent: millimetres(landmark[check])}), ` ${MEANINGS[check]}`)) : [];
@@ -109,6 +111,9 @@ function detail(code) {
     landmark ? field('rename to', select(names, code, async (name) => {
       if (await act('rename', {site: code, name})) { choose(name); }
     })) : element('p', {className: 'hint', textContent: 'Click on the bone at this site, or turn the bone below the middle of the view and press P.'}),
+    landmark ? direction : null,
+    landmark && landmark.turned ? button('Turn back', () => act('turn', {site: code, direction: null}),
+                                         {title: 'to the direction of the bone'}) : null,
     landmark ? remarks(landmark) : null,
     allSites
   ].filter((part) => part);
@@ -142,6 +147,10 @@ export function landmarkPanel(bench) {
       button('Remove all', () => act('clear_landmarks')));
   const root = element('div', {}, head, about, list, files);
 
+  const handle = dowelHandle(scene, () => {
+    const words = about.querySelector('.direction');
+    if (words) { words.textContent = handle.words(); }
+  });
   const marks = () => {
     const state = store.state;
     scene.putMarks([
@@ -166,7 +175,8 @@ export function landmarkPanel(bench) {
                               title: doubtful ? `first confirm or move the ${doubtful} doubtful ones` : ''}) : null),
         guide(state, proposed, doubtful),
         lines(state.errors, 'bad') || '', lines(state.notes, 'soft') || '');
-    about.replaceChildren(...detail(store.site));
+    about.replaceChildren(...detail(store.site, handle));
+    handle.show(landmarkOf(store.site));
     const further = store.sites.filter((site) => !site.standard);
     list.replaceChildren(...standardSites().map(row),
         element('details', {open: further.some((site) => landmarkOf(site.site))},
@@ -206,6 +216,8 @@ export function landmarkPanel(bench) {
 
   // Handles a press on a ball for Scene.onDrag: a drag moves the landmark over the bone, a click chooses it.
   const grip = (event) => {
+    const turning = handle.grip(event);
+    if (turning) { return turning; }
     const {stage} = scene.main, skull = stage.hit(event, ['skull']);
     const ball = stage.ray.intersectObjects(scene.marks.children, true).find(({object}) => object.userData.site);
     if (!ball || (skull && ball.distance > skull.distance + 4)) { return null; }
@@ -252,6 +264,7 @@ export function landmarkPanel(bench) {
     const key = event.key.toLowerCase(), plain = !event.ctrlKey && !event.altKey && !event.metaKey;
     if (plain && key === 'p' && store.site) { placeAt(null); }
     if (plain && 'wasd'.includes(key) && store.site && landmarkOf(store.site)) { nudge(key, event.shiftKey ? 0.2 : 1); }
+    if (plain && 'ijkl'.includes(key) && store.site && landmarkOf(store.site)) { handle.turn(key, event.shiftKey ? 1 : 3); }
     if (event.key.toLowerCase() === 'n' && !event.ctrlKey) { choose(nextOpen(store.site || '')); }
     if (event.key === 'Delete' && store.site && landmarkOf(store.site)) { act('remove', {site: store.site}); }
     if (event.key === 'Enter' && event.target.tagName !== 'BUTTON' && store.site && landmarkOf(store.site)) { confirm(store.site); }
@@ -274,6 +287,7 @@ export function landmarkPanel(bench) {
       scene.shared.layers.get('face').shown = true;
       scene.shared.layers.get('dowels').shown = true;
       scene.putMarks([]);
+      handle.hide();
       scene.update();
     }
   };

@@ -19,6 +19,7 @@
 #include "problems/io/staged_folder.h"
 #include "problems/report/run_folder.h"
 #include "problems/subject/propose/propose_landmarks.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
@@ -353,6 +354,47 @@ void Bench::PlaceByRay(const std::string& site, const Vec3& origin, const Vec3& 
   const auto hit = subject_->bone->FirstHit(origin, direction, kFar_mm);
   const Vec3 point = hit ? hit->position : subject_->bone->Closest(near).position;
   Commit(AddStep(history_, "placed " + site, PlaceLandmark(CurrentState(history_), site, point)));
+}
+
+namespace {
+
+// A file with the landmark of one site.
+LandmarkFile OnlySite(const BenchState& state, const std::string& site) {
+  LandmarkFile file = ToLandmarkFile(state);
+  std::erase_if(file.landmarks, [&](const Landmark& other) { return other.site != site; });
+  if (file.landmarks.empty()) {
+    throw InputError(fmt::format("landmarks: {} is not placed", DescribeSite(site)));
+  }
+  return file;
+}
+
+}  // namespace
+
+Bench::DowelDirection Bench::DirectionOf(const std::string& site) const {
+  const Lock lock(mutex_);
+  CheckSkull();
+  LandmarkFile file = OnlySite(CurrentState(history_), site);
+  const auto placed = [&] {
+    return PlaceDowels(file, subject_->skull.mesh, *subject_->bone, experiment_.landmarks).front();
+  };
+  const Dowel given = placed();
+  file.landmarks.front().normal.reset();
+  return {.base = given.base, .own = placed().direction, .direction = given.direction};
+}
+
+void Bench::TurnDowel(const std::string& site, const std::optional<Vec3>& direction) {
+  const Lock lock(mutex_);
+  CheckSkull();
+  BenchState state = TurnLandmark(CurrentState(history_), site, direction);
+  const auto turns_deg = TurnsOfDowels(OnlySite(state, site), subject_->skull.mesh, *subject_->bone,
+                                       experiment_.landmarks);
+  const auto turn = turns_deg.find(site);
+  Commit(AddStep(history_,
+                 turn == turns_deg.end()
+                     ? fmt::format("turned {} to the bone's own direction", site)
+                     : fmt::format("turned {} to {:.0f} degrees from the bone's own direction",
+                                   site, turn->second),
+                 std::move(state)));
 }
 
 const RunFace& Bench::FreshFace() const {

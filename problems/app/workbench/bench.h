@@ -162,6 +162,18 @@ class Bench {
   void PlaceByRay(const std::string& site, const Vec3& origin, const Vec3& direction,
                   const Vec3& near);
 
+  // The dowel of a placed landmark.
+  struct DowelDirection {
+    Vec3 base = Vec3::Constant(kNaN);       // the point of the bone nearest to the landmark, mm
+    Vec3 own = Vec3::Constant(kNaN);        // the bone's direction there, unit
+    Vec3 direction = Vec3::Constant(kNaN);  // the given direction, or else the bone's, unit
+  };
+  // Throws InputError without a skull and for a site that is not placed.
+  DowelDirection DirectionOf(const std::string& site) const;
+  // Turns the dowel of a landmark; none: to the bone's own direction. Throws InputError, as a run
+  // would, for a direction that is more than kMaxTurn_deg from that.
+  void TurnDowel(const std::string& site, const std::optional<Vec3>& direction);
+
   // Pulls the full face at its point nearest to `at`. Throws InputError if the face is not fresh.
   void PullAt(const Vec3& at, Pull pull);
   // Brushes the full face at its point nearest to `at`. Throws InputError if the face is not fresh.

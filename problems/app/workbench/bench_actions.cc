@@ -96,6 +96,20 @@ BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& 
   return state;
 }
 
+BenchState TurnLandmark(BenchState state, const std::string& site,
+                        const std::optional<Vec3>& direction) {
+  BenchLandmark& landmark = RequirePlaced(state, site);
+  landmark.normal.reset();
+  if (direction) {
+    if (!direction->allFinite() || !(direction->norm() > 0)) {
+      throw InputError("landmarks: the direction has no length");
+    }
+    const Vec3 unit = direction->normalized();
+    landmark.normal = {unit.x(), unit.y(), unit.z()};
+  }
+  return state;
+}
+
 BenchState RemoveLandmark(BenchState state, const std::string& site) {
   const BenchLandmark& placed = RequirePlaced(state, site);
   state.landmarks.erase(state.landmarks.begin() + (&placed - state.landmarks.data()));

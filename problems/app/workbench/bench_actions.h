@@ -22,6 +22,11 @@ BenchState NameCase(BenchState state, const std::string& name);
 // a person's note stay. Its normal is dropped because the normal belonged to the former place.
 BenchState PlaceLandmark(BenchState state, const std::string& site, const Vec3& point);
 
+// Gives the landmark's dowel a direction out of the bone, or the bone's own one again. The point
+// and its proposal stay as they are. Throws for a direction without length.
+BenchState TurnLandmark(BenchState state, const std::string& site,
+                        const std::optional<Vec3>& direction);
+
 BenchState RemoveLandmark(BenchState state, const std::string& site);
 
 // Renames the landmark at `site` to `name`. If `name` is placed already, the two exchange names.

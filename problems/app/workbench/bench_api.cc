@@ -293,11 +293,23 @@ LandmarkRemarks ReadRemarks(const Json& json) {
   return remarks;
 }
 
+// The dowel of ?site=CODE.
+PageReply DirectionReply(Bench& bench, const PageRequest& request) {
+  const Bench::DowelDirection dowel = bench.DirectionOf(QueryText(request, "site"));
+  return JsonReply(
+      Json{{"base", dowel.base}, {"own", dowel.own}, {"direction", dowel.direction}}.dump());
+}
+
 using Action = void (*)(Bench&, const Json&);
 
 void Place(Bench& bench, const Json& json) {
   bench.PlaceByRay(ReadText(json, "site"), ReadVector(json, "origin"),
                    ReadVector(json, "direction"), ReadVector(json, "near"));
+}
+void Turn(Bench& bench, const Json& json) {
+  bench.TurnDowel(ReadText(json, "site"), json.at("direction").is_null()
+                                              ? std::nullopt
+                                              : std::optional(ReadVector(json, "direction")));
 }
 void Remove(Bench& bench, const Json& json) {
   const std::string site = ReadText(json, "site");
@@ -411,8 +423,9 @@ void RunFace(Bench& bench, const Json&) { bench.StartRun(); }
 void ProposeSites(Bench& bench, const Json&) { bench.StartProposal(); }
 void Cancel(Bench& bench, const Json&) { bench.CancelJob(); }
 
-constexpr std::array<std::pair<std::string_view, Action>, 25> kActions = {
+constexpr std::array<std::pair<std::string_view, Action>, 26> kActions = {
     {{"place", &Place},
+     {"turn", &Turn},
      {"remove", &Remove},
      {"rename", &Rename},
      {"absent", &Absent},
@@ -541,6 +554,7 @@ constexpr std::array kRoutes = {
     Route{"GET", "api/sites", &Sites},
     Route{"GET", "api/sites.svg", &SitesPicture},
     Route{"GET", "api/site.png", &SitePictureReply},
+    Route{"GET", "api/direction", &DirectionReply},
     Route{"GET", "api/files", &Files},
     Route{"GET", "api/meshes", &Meshes},
     Route{"GET", "api/coarse", &CoarseReply},

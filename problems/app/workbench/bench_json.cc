@@ -17,11 +17,8 @@ namespace {
 using Json = nlohmann::ordered_json;  // writes NaN as null
 
 Json LandmarkJson(const BenchLandmark& l, const LandmarkChecks& checks) {
-  Json json = {{"site", l.site},
-               {"point", l.point},
-               {"certainty", EnumWord(l.certainty)},
-               {"note", l.note},
-               {"proposed", l.proposed}};
+  Json json = {{"site", l.site}, {"point", l.point},       {"certainty", EnumWord(l.certainty)},
+               {"note", l.note}, {"proposed", l.proposed}, {"turned", l.normal.has_value()}};
   json["doubt_mm"] = l.doubt_mm ? Json(*l.doubt_mm) : Json();
   json["doubtful"] = l.IsDoubtful();
   json["depth_along_normal_mm"] = l.depth_along_normal_mm ? Json(*l.depth_along_normal_mm) : Json();

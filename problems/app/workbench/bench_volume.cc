@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "problems/io/volumes/grey_slice.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
@@ -48,14 +49,6 @@ class SliceReader {
   PlaneAxes axes_;
   std::array<int, 3> at_ = {0, 0, 0};
 };
-
-// From air to dense bone, brighter in the range of soft tissue.
-double Brightness(int hu) {
-  constexpr double kAir = -400, kSoft = 200, kDense = 2000, kSoftShare = 0.55;
-  return hu < kSoft ? kSoftShare * std::clamp((hu - kAir) / (kSoft - kAir), 0.0, 1.0)
-                    : kSoftShare +
-                          (1 - kSoftShare) * std::clamp((hu - kSoft) / (kDense - kSoft), 0.0, 1.0);
-}
 
 void CheckSliceOptions(const SliceOptions& options) {
   constexpr int kMaxSide = 1024;
@@ -105,7 +98,7 @@ Image DrawSlice(const CtVolume& volume, const SliceOptions& options) {
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
       const int hu = value(x, y);
-      const double grey = Brightness(hu);
+      const double grey = CtBrightness(hu);
       BlendPixel(image, x, y, {grey, grey, grey}, 1);
       if (hu >= options.bone_hu) {
         BlendPixel(image, x, y, kBone, kTint);

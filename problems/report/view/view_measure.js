@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Measuring in the 3-D view of reports and of the workbench: distances, tissue depth, pinned labels, a clipping plane
-// and full screen.
+// with its section, and full screen.
 'use strict';
 const SemblanceSurface = (() => {
   // A binary heap of [distance, vertex], nearest first.
@@ -159,7 +159,9 @@ class SemblanceMeasure {
     this.marks = [];
     this.pending = null;
     this.clip = {axis: 'none', at: 0.5, flipped: false};
+    this.section = new SemblanceSection(this.unit, this.digits);
     for (const stage of stages) { this.attach(stage); }
+    if (stages.length) { stages[0].afterDraw.push(() => this.section.show(stages[0], this.clip, this.box)); }
   }
 
   // A press that does not move is a click. A drag turns the head.
@@ -357,6 +359,6 @@ class SemblanceMeasure {
                  tool('label', 'Pin'), clear, full),
             made('label', {className: 'view3d-choice'}, 'label ', this.text), this.status,
             made('label', {className: 'view3d-choice'}, 'cut ', axis), slider,
-            made('label', {className: 'view3d-choice'}, 'other half ', flip)];
+            made('label', {className: 'view3d-choice'}, 'other half ', flip), this.section.element];
   }
 }

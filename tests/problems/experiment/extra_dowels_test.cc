@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <numbers>
 
 #include "problems/experiment/dowel_projection.h"
 #include "problems/experiment/experiment_config.h"
@@ -203,6 +204,30 @@ TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeld) {
   };
   EXPECT_EQ(uv_of("go_l: {uv: [0.81, 0.31], hold: true}"), Vec2(0.81, 0.31));
   EXPECT_NE(uv_of("go_l: {uv: [0.81, 0.31]}"), Vec2(0.81, 0.31));
+}
+
+TEST(ExtraDowels, AGivenDirectionIsKeptAndListed) {
+  const Case own = CaseOf(Phantom30(fmt::format("mine: {{{}, depth: 5}}", kCheek)));
+  const Vec3 bone = At(own.dowels_on_bone, "mine").direction;
+  EXPECT_FALSE(own.turns_deg.contains("mine"));
+  const Vec3 turned = Eigen::AngleAxisd(20 * std::numbers::pi / 180, bone.unitOrthogonal()) * bone;
+  const Case subject =
+      CaseOf(Phantom30(fmt::format("mine: {{{}, depth: 5, direction: [{}, {}, {}]}}", kCheek,
+                                   3 * turned.x(), 3 * turned.y(), 3 * turned.z())));
+  EXPECT_NEAR((At(subject.dowels_on_bone, "mine").direction - turned).norm(), 0, 1e-9);
+  EXPECT_NEAR(subject.turns_deg.at("mine"), 20, 1e-6);
+}
+
+TEST(ExtraDowels, ADirectionIntoTheHeadIsRefused) {
+  const auto words = [](const std::string& direction) {
+    return WordsOf<Error>([&] {
+      CaseOf(Phantom30(fmt::format("mine: {{{}, depth: 5, direction: {}}}", kCheek, direction)));
+    });
+  };
+  EXPECT_THAT(words("[0, 1, 0]"), HasSubstr("into the head"));
+  EXPECT_THAT(words("[0, 0, 0]"), HasSubstr("has no length"));
+  EXPECT_THAT(WordsOf<Error>([] { CaseOf(Phantom30("n: {direction: [0, -1, 0]}")); }),
+              HasSubstr("give that landmark a `normal` instead"));
 }
 
 }  // namespace

@@ -261,5 +261,42 @@ TEST(PlaceDowels, RefusesToGuessADirection) {
               HasSubstr("give the landmark a normal, or increase normal_radius_mm"));
 }
 
+// A landmark on top of a ball with a normal that is tilted by so many degrees.
+LandmarkFile TiltedOnTop(double tilt_deg) {
+  const double tilt = tilt_deg * std::numbers::pi / 180;
+  LandmarkFile file;
+  file.subject = "ball";
+  file.landmarks.resize(2);
+  file.landmarks[0].site = "g";
+  file.landmarks[0].point = {0, 0, 50};
+  file.landmarks[0].normal = {std::sin(tilt), 0, std::cos(tilt)};
+  file.landmarks[1].site = "n";
+  file.landmarks[1].point = {50, 0, 0};
+  return file;
+}
+
+TEST(DowelDirections, TheTurnIsTheAngleFromTheBonesOwnDirection) {
+  const TriMesh ball = SphereMesh({0, 0, 0}, 50, 60);
+  const MeshQuery query(ball);
+  for (const double tilt_deg : {0.0, 12.0, 40.0, 74.0}) {
+    const LandmarkFile file = TiltedOnTop(tilt_deg);
+    const auto turns_deg = TurnsOfDowels(file, ball, query, {});
+    ASSERT_EQ(turns_deg.size(), 1u) << "n has no direction of its own";
+    EXPECT_NEAR(turns_deg.at("g"), tilt_deg, 0.2);
+    const Dowel placed = PlaceDowels(file, ball, query, {}).front();
+    EXPECT_NEAR((placed.direction - Vec3(file.landmarks[0].normal->data())).norm(), 0, 1e-12);
+  }
+}
+
+TEST(DowelDirections, SidewaysAndIntoTheHeadAreRefused) {
+  const TriMesh ball = SphereMesh({0, 0, 0}, 50, 60);
+  const MeshQuery query(ball);
+  for (const double tilt_deg : {77.0, 90.0, 135.0, 180.0}) {
+    EXPECT_THAT([&] { TurnsOfDowels(TiltedOnTop(tilt_deg), ball, query, {}); },
+                ::testing::ThrowsMessage<InputError>(::testing::AllOf(
+                    HasSubstr("landmarks of ball: site g"), HasSubstr("at most 75"))));
+  }
+}
+
 }  // namespace
 }  // namespace semblance::problems

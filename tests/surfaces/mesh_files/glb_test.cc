@@ -127,5 +127,68 @@ TEST(Glb, WhatGlTfCannotHoldIsRefused) {
   }
 }
 
+// The place in the scene of a point of the node's own frame after the turn of key `k`.
+Eigen::Vector3f Turned(const std::vector<float>& rotations, std::size_t k,
+                       const Eigen::Vector3f& p) {
+  const Eigen::Quaternionf q(rotations[4 * k + 3], rotations[4 * k], rotations[4 * k + 1],
+                             rotations[4 * k + 2]);
+  return q * p;
+}
+
+TEST(Glb, ATurningNodeHasOneTurnAboutTheVerticalAxis) {
+  const GlbNode still{.name = "s", .parts = {Triangle1("m")}, .offset_mm = {-100, -200, -300}};
+  const std::vector<GlbNode> nodes = {
+      {.name = "a", .children = {still}, .turn_s = 6},
+      {.name = "b", .children = {still}, .offset_mm = {500, 0, 0}, .turn_s = 6}};
+  const ReadGlb read = Parse(EncodeGlb(nodes));
+  EXPECT_EQ(read.json["nodes"][1]["translation"], Json({-0.1f, -0.3f, 0.2f}));
+  ASSERT_EQ(read.json["animations"].size(), 1u);
+  const Json& animation = read.json["animations"][0];
+  ASSERT_EQ(animation["channels"].size(), 2u);
+  for (std::size_t c = 0; c < 2; ++c) {
+    const Json& channel = animation["channels"][c];
+    EXPECT_EQ(channel["target"]["path"], "rotation");
+    EXPECT_EQ(channel["target"]["node"], c == 0 ? 0 : 2);
+    const Json& sampler = animation["samplers"][channel["sampler"].get<int>()];
+    EXPECT_EQ(sampler["interpolation"], "LINEAR");
+    const auto times = Numbers<float>(read, sampler["input"]);
+    const auto rotations = Numbers<float>(read, sampler["output"]);
+    const Json& input = read.json["accessors"][sampler["input"].get<int>()];
+    EXPECT_EQ(input["type"], "SCALAR");
+    EXPECT_EQ(input["min"][0], 0);
+    EXPECT_EQ(input["max"][0], 6);
+    EXPECT_EQ(read.json["accessors"][sampler["output"].get<int>()]["type"], "VEC4");
+    ASSERT_EQ(rotations.size(), 4 * times.size());
+    EXPECT_EQ(times.front(), 0);
+    EXPECT_EQ(times.back(), 6);
+    for (std::size_t k = 0; k < times.size(); ++k) {
+      const float* const q = &rotations[4 * k];
+      EXPECT_NEAR(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3], 1, 1e-6);
+      EXPECT_EQ(q[0], 0);
+      EXPECT_EQ(q[2], 0);
+      if (k > 0) {
+        EXPECT_GT(times[k], times[k - 1]);
+        // Less than half a turn from key to key, on the same half of the sphere.
+        EXPECT_GT(q[1] * q[-3] + q[3] * q[-1], 0.5);
+      }
+    }
+    // After a quarter the subject's left (+x) is at the front (+z); after all, where it was.
+    const std::size_t quarter = (times.size() - 1) / 4;
+    EXPECT_NEAR((Turned(rotations, quarter, {1, 0, 0}) - Eigen::Vector3f(0, 0, 1)).norm(), 0, 1e-6);
+    EXPECT_NEAR((Turned(rotations, times.size() - 1, {1, 2, 3}) - Eigen::Vector3f(1, 2, 3)).norm(),
+                0, 1e-5);
+  }
+}
+
+TEST(Glb, WithoutATurnThereIsNoAnimation) {
+  const GlbNode node{.name = "n", .parts = {Triangle1("m")}};
+  EXPECT_FALSE(Parse(EncodeGlb({&node, 1})).json.contains("animations"));
+}
+
+TEST(Glb, ATurnTakesTime) {
+  const GlbNode node{.name = "n", .parts = {Triangle1("m")}, .turn_s = 0};
+  EXPECT_THROW(EncodeGlb({&node, 1}), InputError);
+}
+
 }  // namespace
 }  // namespace semblance::surfaces

@@ -430,5 +430,31 @@ TEST_F(WorkbenchBench, AFolderWithOtherFilesIsRefused) {
   EXPECT_FALSE(fs::exists(options.folder / "workbench.yaml"));
 }
 
+TEST_F(WorkbenchBench, ATurnedDowelIsSavedUndoneAndRunAsItIs) {
+  Bench bench(Options());
+  bench.TurnDowel("zy_l", std::nullopt);
+  const Bench::DowelDirection own = bench.DirectionOf("zy_l");
+  EXPECT_NEAR((own.direction - own.own).norm(), 0, 1e-12);
+  const Vec3 turned = Eigen::AngleAxisd(0.4, own.own.unitOrthogonal()) * own.own;
+  bench.TurnDowel("zy_l", 2 * turned);
+  EXPECT_NEAR((bench.DirectionOf("zy_l").direction - turned).norm(), 0, 1e-12);
+  EXPECT_NEAR((bench.DirectionOf("zy_l").own - own.own).norm(), 0, 1e-12);
+  const LandmarkFile file = ReadLandmarkFileAsWritten(folder_ / "bench/landmarks.yaml");
+  ASSERT_TRUE(file.Find("zy_l")->normal);
+  EXPECT_NEAR((Vec3(file.Find("zy_l")->normal->data()) - turned).norm(), 0, 1e-9);
+  const auto experiment = ReadConfig<Experiment>(folder_ / "bench/config.yaml");
+  const Case subject = MakeCase(LoadSubject(experiment.subject, {}), experiment);
+  const Dowel& dowel = *std::ranges::find(subject.dowels_on_bone, "zy_l", &Dowel::site);
+  EXPECT_NEAR((dowel.direction - turned).norm(), 0, 1e-9);
+  EXPECT_NEAR(subject.turns_deg.at("zy_l"), 0.4 * 180 / 3.14159265358979, 1e-6);
+  bench.Undo();
+  EXPECT_NEAR((bench.DirectionOf("zy_l").direction - own.own).norm(), 0, 1e-12);
+  const int before = bench.TakeSnapshot().history.now;
+  EXPECT_THROW(bench.TurnDowel("zy_l", -own.own), InputError);
+  EXPECT_THROW(bench.TurnDowel("zy_l", own.own.unitOrthogonal()), InputError);
+  EXPECT_THROW(bench.TurnDowel("zy_l", Vec3(0, 0, 0)), InputError);
+  EXPECT_EQ(bench.TakeSnapshot().history.now, before);
+}
+
 }  // namespace
 }  // namespace semblance::problems
