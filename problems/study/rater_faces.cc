@@ -95,7 +95,9 @@ Image DrawRaterFace(const TriMesh& face, Random& random, int threads) {
   for (Vec3& p : mesh.points) {
     p = turn * p;
   }
-  const auto cameras = CamerasFor(std::array{View::kFront, View::kThreeQuarter}, kFaceBox, kAspect);
+  const Vec3 around(20, 20, 10);  // three-quarter views reach beyond the box
+  const Box3 framed(kFaceBox.min() - around, kFaceBox.max() + around);
+  const auto cameras = CamerasFor(std::array{View::kFront, View::kThreeQuarter}, framed, kAspect);
   ShadowMaps shadows;
   const std::vector<Image> sides =
       RenderAll({{SkinObject(std::move(mesh))}}, cameras, {.width = kWidth, .height = kHeight},
