@@ -20,6 +20,7 @@
 #include "problems/report/pictures/site_picture.h"
 #include "problems/report/site_page.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
+#include "problems/subject/landmark_mistakes.h"
 #include "problems/subject/propose/propose_landmarks.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/atomic_file.h"
@@ -139,6 +140,34 @@ LandmarkFile WithKnown(LandmarkFile known, const Proposal& proposal, const std::
   return file;
 }
 
+// Of several proposed landmarks at one point, keeps the one with the least doubt and lists the
+// others as absent, because a run refuses two sites at one point. Points of a person stay.
+LandmarkFile WithoutSamePoints(LandmarkFile file) {
+  std::vector<Landmark> by_doubt = file.landmarks, kept;
+  const auto doubt_mm = [](const Landmark& l) { return l.doubt_mm.value_or(0); };
+  std::ranges::stable_sort(by_doubt, {}, doubt_mm);
+  Box3 extent;
+  for (const Landmark& landmark : file.landmarks) {
+    extent.extend(landmark.Position());
+  }
+  const double same_mm = SamePoint_mm(extent);
+  for (const Landmark& landmark : by_doubt) {
+    const auto surer = std::ranges::find_if(kept, [&](const Landmark& other) {
+      return (other.Position() - landmark.Position()).norm() <= same_mm;
+    });
+    if (surer == kept.end() || !landmark.doubt_mm) {
+      kept.push_back(landmark);
+      continue;
+    }
+    file.absent.push_back(
+        {landmark.site, fmt::format("proposed at the point of {}; a person has to "
+                                    "place it",
+                                    surer->site)});
+    std::erase_if(file.landmarks, [&](const Landmark& l) { return l.site == landmark.site; });
+  }
+  return file;
+}
+
 void PrintDifferences(const ProposeArguments& a, const LandmarkFile& file) {
   Tell("{}", FormatComparison(CompareProposal(InLpsMm(file), ReadLandmarks(a.compare).file)));
 }
@@ -184,7 +213,8 @@ int Propose(const ProposeArguments& a) {
   const Proposal proposal = MakeProposal(a, skull, known, context);
   PrintEach(notes, "note");
   PrintEach(proposal.notes, "note");
-  const LandmarkFile file = WithKnown(known, proposal, fs::path(a.skull).stem().string());
+  const LandmarkFile file =
+      WithoutSamePoints(WithKnown(known, proposal, fs::path(a.skull).stem().string()));
   if (!a.compare.empty()) {
     PrintDifferences(a, file);
   }
