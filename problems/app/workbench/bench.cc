@@ -370,7 +370,7 @@ LandmarkFile OnlySite(const BenchState& state, const std::string& site) {
 
 }  // namespace
 
-Bench::DowelDirection Bench::DirectionOf(const std::string& site) const {
+Bench::DowelDirection Bench::FindDirection(const std::string& site) const {
   const Lock lock(mutex_);
   CheckSkull();
   LandmarkFile file = OnlySite(CurrentState(history_), site);

@@ -169,7 +169,7 @@ class Bench {
     Vec3 direction = Vec3::Constant(kNaN);  // the given direction, or else the bone's, unit
   };
   // Throws InputError without a skull and for a site that is not placed.
-  DowelDirection DirectionOf(const std::string& site) const;
+  DowelDirection FindDirection(const std::string& site) const;
   // Turns the dowel of a landmark; none: to the bone's own direction. Throws InputError, as a run
   // would, for a direction that is more than kMaxTurn_deg from that.
   void TurnDowel(const std::string& site, const std::optional<Vec3>& direction);

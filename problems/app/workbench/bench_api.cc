@@ -295,7 +295,7 @@ LandmarkRemarks ReadRemarks(const Json& json) {
 
 // The dowel of ?site=CODE.
 PageReply DirectionReply(Bench& bench, const PageRequest& request) {
-  const Bench::DowelDirection dowel = bench.DirectionOf(QueryText(request, "site"));
+  const Bench::DowelDirection dowel = bench.FindDirection(QueryText(request, "site"));
   return JsonReply(
       Json{{"base", dowel.base}, {"own", dowel.own}, {"direction", dowel.direction}}.dump());
 }

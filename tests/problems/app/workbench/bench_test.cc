@@ -433,12 +433,12 @@ TEST_F(WorkbenchBench, AFolderWithOtherFilesIsRefused) {
 TEST_F(WorkbenchBench, ATurnedDowelIsSavedUndoneAndRunAsItIs) {
   Bench bench(Options());
   bench.TurnDowel("zy_l", std::nullopt);
-  const Bench::DowelDirection own = bench.DirectionOf("zy_l");
+  const Bench::DowelDirection own = bench.FindDirection("zy_l");
   EXPECT_NEAR((own.direction - own.own).norm(), 0, 1e-12);
   const Vec3 turned = Eigen::AngleAxisd(0.4, own.own.unitOrthogonal()) * own.own;
   bench.TurnDowel("zy_l", 2 * turned);
-  EXPECT_NEAR((bench.DirectionOf("zy_l").direction - turned).norm(), 0, 1e-12);
-  EXPECT_NEAR((bench.DirectionOf("zy_l").own - own.own).norm(), 0, 1e-12);
+  EXPECT_NEAR((bench.FindDirection("zy_l").direction - turned).norm(), 0, 1e-12);
+  EXPECT_NEAR((bench.FindDirection("zy_l").own - own.own).norm(), 0, 1e-12);
   const LandmarkFile file = ReadLandmarkFileAsWritten(folder_ / "bench/landmarks.yaml");
   ASSERT_TRUE(file.Find("zy_l")->normal);
   EXPECT_NEAR((Vec3(file.Find("zy_l")->normal->data()) - turned).norm(), 0, 1e-9);
@@ -448,7 +448,7 @@ TEST_F(WorkbenchBench, ATurnedDowelIsSavedUndoneAndRunAsItIs) {
   EXPECT_NEAR((dowel.direction - turned).norm(), 0, 1e-9);
   EXPECT_NEAR(subject.turns_deg.at("zy_l"), 0.4 * 180 / 3.14159265358979, 1e-6);
   bench.Undo();
-  EXPECT_NEAR((bench.DirectionOf("zy_l").direction - own.own).norm(), 0, 1e-12);
+  EXPECT_NEAR((bench.FindDirection("zy_l").direction - own.own).norm(), 0, 1e-12);
   const int before = bench.TakeSnapshot().history.now;
   EXPECT_THROW(bench.TurnDowel("zy_l", -own.own), InputError);
   EXPECT_THROW(bench.TurnDowel("zy_l", own.own.unitOrthogonal()), InputError);

@@ -163,6 +163,32 @@ def place_by_keys(browser, site):
                  "return l.point[0] === arguments[1]", site, before[0])
 
 
+def turn_a_dowel(browser, site):
+    """L turns the chosen site's depth marker, a drag of the arrow's tip too; Undo turns it back."""
+    known = "const words = document.querySelector('.about .direction'); return words && words.textContent.includes(arguments[0])"
+    browser.run("window.semblance.scene.shared.camera.look(60, 0)")
+    browser.click(f'[data-site="{site}"]')
+    browser.wait(known, "arker")
+    browser.run("document.activeElement.blur()")
+    former = undo_words(browser)
+    browser.press("l")
+    browser.wait("return window.semblance.store.state.steps.undo !== arguments[0]", former)
+    assert landmark(browser, site)["turned"]
+    browser.wait(known, "is turned by")
+    tip = browser.run("""const {arrow, shared, main} = window.semblance.scene, box = main.canvas.getBoundingClientRect();
+        const at = new THREE.Vector3(0, 20, 0).applyQuaternion(arrow.quaternion).add(arrow.position).project(shared.camera.camera);
+        return [box.left + (at.x + 1) / 2 * box.width, box.top + (1 - at.y) / 2 * box.height];""")
+    middle = undo_words(browser)
+    browser.press_and_drag(tip, (tip[0] + 4, tip[1] - 40))
+    browser.release()
+    browser.wait("return window.semblance.store.state.steps.undo !== arguments[0]", middle)
+    assert f"turned {site} to" in undo_words(browser), undo_words(browser)
+    browser.press(UNDO)
+    browser.wait("return window.semblance.store.state.steps.undo === arguments[0]", middle)
+    browser.press(UNDO)
+    browser.wait("return window.semblance.store.state.steps.undo === arguments[0]", former)
+
+
 def brush_the_face(browser):
     """A touch of a brush changes control vertices, and makes the report out of date."""
     browser.click("[data-tab=sculpt]")
@@ -342,6 +368,7 @@ def work(browser, program, config, folder, pictures):
         place_by_clicks(browser, points)
         drag_a_landmark(browser, "n")
         place_by_keys(browser, "n")
+        turn_a_dowel(browser, "zy_l")
         browser.press(UNDO)
         browser.wait("return !window.semblance.store.state.landmarks.some((l) => l.site === 'go_r')")
         browser.click("#redo")
