@@ -57,7 +57,8 @@ class PointReader {
 // Onto the subject
 // ---------------------------------------------------------------------------------------------
 
-// The deformed mean bone, point by point.
+// The deformed mean bone, point by point, then the sites in the order of their codes. The sites are
+// carried along, and move no other point.
 struct Carried {
   std::vector<Vec3> points, normals;
 };
@@ -108,10 +109,12 @@ Carried Place(const People& people, const ThinPlate& plate) {
                                    Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Mat3 turn = svd.matrixU() * svd.matrixV().transpose();
   Carried carried;
-  for (const PeoplePoint& point : people.bone) {
+  const auto carry = [&](const PeoplePoint& point) {
     carried.points.push_back(plate(point.position));
     carried.normals.emplace_back(turn * point.normal);
-  }
+  };
+  std::ranges::for_each(people.bone, carry);
+  std::ranges::for_each(people.sites, [&](const auto& site) { carry(site.second); });
   return carried;
 }
 
@@ -130,13 +133,15 @@ Feet FindFeet(const Carried& carried, const Correspondences& bone, double reach_
   return feet;
 }
 
-// Moves each point by the mean way of its neighbours to their feet, with Gaussian weights.
-void MoveSmoothly(Carried& carried, const Feet& feet, double width_mm, int threads) {
+// Moves each point by the mean way of the first `leading` points to their feet, with Gaussian
+// weights.
+void MoveSmoothly(Carried& carried, const Feet& feet, std::size_t leading, double width_mm,
+                  int threads) {
   const std::vector<Vec3> from = carried.points;
   ParallelFor(from.size(), threads, 16, [&](std::size_t i) {
     Vec3 way = Vec3::Zero();
     double weights = 0;
-    for (std::size_t k = 0; k < from.size(); ++k) {
+    for (std::size_t k = 0; k < leading; ++k) {
       if (feet[k]) {
         const double weight =
             std::exp(-(from[k] - from[i]).squaredNorm() / (2 * width_mm * width_mm));
@@ -151,7 +156,8 @@ void MoveSmoothly(Carried& carried, const Feet& feet, double width_mm, int threa
 // A person's bone differs from the mean first in size and proportions, then in ever smaller forms.
 // The widths are those with which the mean bone itself was laid on the 54 heads. A wider reach
 // finds bone of another part, a narrower one loses a long face.
-void FollowBone(Carried& carried, const Correspondences& bone, const RunContext& run) {
+void FollowBone(Carried& carried, std::size_t leading, const Correspondences& bone,
+                const RunContext& run) {
   struct Stage {
     double width_mm;
     int rounds;
@@ -161,7 +167,7 @@ void FollowBone(Carried& carried, const Correspondences& bone, const RunContext&
     for (int round = 0; round < stage.rounds; ++round) {
       run.ThrowIfStopped();
       const Feet feet = FindFeet(carried, bone, kReach_mm, run.threads);
-      MoveSmoothly(carried, feet, stage.width_mm, run.threads);
+      MoveSmoothly(carried, feet, leading, stage.width_mm, run.threads);
     }
   }
 }
@@ -178,7 +184,7 @@ std::vector<SubjectPoint> PointsOnSkull(const People& people, const Carried& car
                                         const Feet& feet, const DepthInput& input) {
   const MeshQuery skull(input.skull);
   std::vector<SubjectPoint> points;
-  for (std::size_t i = 0; i < carried.points.size(); ++i) {
+  for (std::size_t i = 0; i < people.bone.size(); ++i) {
     const Vec3& normal = carried.normals[i];
     const double gap_mm =
         feet[i] && input.bone != nullptr ? GapTo(skull, carried.points[i], normal) : 0;
@@ -189,7 +195,18 @@ std::vector<SubjectPoint> PointsOnSkull(const People& people, const Carried& car
   return points;
 }
 
-CarriedBone Fault(std::string words) { return {{}, std::move(words)}; }
+std::map<std::string, Vec3> SitesOnBone(const People& people, const Feet& feet) {
+  std::map<std::string, Vec3> sites;
+  std::size_t at = people.bone.size();
+  for (const auto& [site, point] : people.sites) {
+    if (const std::optional<Vec3>& foot = feet[at++]) {
+      sites[site] = *foot;
+    }
+  }
+  return sites;
+}
+
+CarriedBone Fault(std::string words) { return {{}, {}, std::move(words)}; }
 
 }  // namespace
 
@@ -230,7 +247,7 @@ CarriedBone CarryToSubject(const People& people, const DepthInput& input, const 
   Carried carried = Place(people, PlateThrough(people, sites));
   // Points beyond the end of a scan would pile up at its border.
   const Correspondences on_bone(bone, OpenBorder::kReject);
-  FollowBone(carried, on_bone, run);
+  FollowBone(carried, people.bone.size(), on_bone, run);
   const Feet feet = FindFeet(carried, on_bone, kFarthest_mm, run.threads);
   std::vector<SubjectPoint> points = PointsOnSkull(people, carried, feet, input);
   if (points.size() * kFewest < people.bone.size()) {
@@ -239,7 +256,7 @@ CarriedBone CarryToSubject(const People& people, const DepthInput& input, const 
         "face, or its landmarks are wrong",
         points.size(), people.bone.size()));
   }
-  return {std::move(points), {}};
+  return {std::move(points), SitesOnBone(people, feet), {}};
 }
 
 }  // namespace semblance::interp

@@ -55,7 +55,8 @@ struct SubjectPoint {
 // People's points on a subject, or why there are none.
 struct CarriedBone {
   std::vector<SubjectPoint> points;
-  std::string fault;  // empty if there are points
+  std::map<std::string, Vec3> sites;  // on the bone, by site code; those that find bone
+  std::string fault;                  // empty if there are points
 };
 
 // Carries the mean bone onto input.bone (input.skull without it): by a thin plate through the sites

@@ -72,7 +72,7 @@ Truth ReadTruthOfExperiment(const EvaluateOptions& options, const RunContext& co
                             Notes& notes) {
   const auto experiment = ReadConfig<Experiment>(options.config, options.overrides);
   CheckNetworkNamed(experiment, options.config);
-  Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment);
+  Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment, context);
   notes.insert(notes.end(), subject.notes.begin(), subject.notes.end());
   if (!options.truth.empty()) {
     subject.skin = ReadChecked(options.truth, notes);

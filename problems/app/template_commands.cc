@@ -166,7 +166,7 @@ Experiment ReadKnown(const fs::path& config, const RecentreArguments& a) {
 // The dowels of a head and the scored part of its skin.
 KnownHead ReadHead(const fs::path& config, const RecentreArguments& a, const RunContext& context) {
   const Experiment experiment = ReadKnown(config, a);
-  const Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment);
+  const Case subject = MakeCase(LoadSubject(experiment.subject, context), experiment, context);
   if (!subject.skin) {
     throw InputError(
         fmt::format("{}: the head has no skin, which recentring needs", config.string()));

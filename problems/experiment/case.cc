@@ -361,16 +361,18 @@ std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOpt
   return CheckLandmarks(subject, MeshQuery(subject.skull), options);
 }
 
-Case MakeCase(const SubjectData& data, const Experiment& experiment) {
-  return MakeCase(data, experiment, MeshQuery(data.skull));
+Case MakeCase(const SubjectData& data, const Experiment& experiment, const RunContext& context) {
+  return MakeCase(data, experiment, MeshQuery(data.skull), context);
 }
 
-Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQuery& query) {
+Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQuery& query,
+              const RunContext& context) {
   CheckNetworkNamed(experiment);
   Case subject = StartCase(data, experiment, query);
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
   GiveDepths(data, experiment, query, subject);
   InsertDowels(experiment, data, query, subject);
+  InsertCarriedDowels(experiment, data, query, context, subject);
   LimitDowels(experiment, data.landmarks, subject);
   const NetworkPlan plan = ReadNetworkPlan(experiment.network);
   Append(subject.notes,

@@ -40,11 +40,11 @@ struct Case {
   std::vector<Dowel> scored_on_bone;    // at all sites, whatever sites the experiment uses
   DowelNetwork scored_network;          // of scored_on_bone; depths are compared in front of it
   std::map<std::string, double> turns_deg = {};  // of dowels with a given direction (TurnsOfDowels)
-  std::map<std::string, Vec3> points;            // all landmarks as given, with or without depth, mm
-  ScoreBasis basis;                              // the landmarks as given; they decide what is scored
-  std::vector<BoundEffect> bounds;               // one per entry of tissue.bounds
-  std::vector<GreySlice> slices = {};            // of a CT, in HeadPlanes (head_planes.h)
-  std::vector<std::string> notes;                // for readers of the result, one line each
+  std::map<std::string, Vec3> points;         // all landmarks as given, with or without depth, mm
+  ScoreBasis basis;                           // the landmarks as given; they decide what is scored
+  std::vector<BoundEffect> bounds;            // one per entry of tissue.bounds
+  std::vector<GreySlice> slices = {};         // of a CT, in HeadPlanes (head_planes.h)
+  std::vector<std::string> notes;             // for readers of the result, one line each
   std::vector<std::filesystem::path> inputs;  // for the manifest
 };
 
@@ -72,10 +72,11 @@ std::vector<std::string> CheckSubject(const SubjectData& subject, const PlaceOpt
 void CheckNetworkNamed(const Experiment& experiment, const std::filesystem::path& config = {});
 
 // Places the dowels on the bone and gives them their depths and network. Throws as LoadSubject and
-// CheckSubject do.
-Case MakeCase(const SubjectData& subject, const Experiment& experiment);
+// CheckSubject do; throws Cancelled.
+Case MakeCase(const SubjectData& subject, const Experiment& experiment, const RunContext& context);
 // The same with a given query of the subject's skull.
-Case MakeCase(const SubjectData& subject, const Experiment& experiment, const MeshQuery& skull);
+Case MakeCase(const SubjectData& subject, const Experiment& experiment, const MeshQuery& skull,
+              const RunContext& context);
 
 // Checks `rules` and `sites` against the subject. Throws InputError, one line each, for a rule's
 // point that lies off the bone or on the other side, and for the (u,v) of a landmark that the way

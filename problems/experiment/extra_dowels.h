@@ -29,6 +29,12 @@ TissueOptions WithSiteDepths(const Experiment& experiment, const LandmarkFile& l
 void InsertDowels(const Experiment& experiment, const SubjectData& data, const MeshQuery& skull,
                   Case& subject);
 
+// Adds dowels at the sites of options.landmarks.carried, with one note for those with a depth of
+// their own, and one for those whose depth is to be interpolated. Adds none on a phantom's skull,
+// or where people's mean bone cannot be laid on the skull.
+void InsertCarriedDowels(const Experiment& experiment, const SubjectData& data,
+                         const MeshQuery& skull, const RunContext& context, Case& subject);
+
 // Joins the dowels that are at no standard site and in no area of the plan to the network
 // (network_insertion.h). Returns a note for each dowel outside the network.
 std::vector<std::string> JoinNetwork(const NetworkPlan& plan, std::span<const Dowel> dowels,

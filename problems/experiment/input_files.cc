@@ -277,7 +277,7 @@ CheckFindings InputCheck::CheckCase(const Experiment& experiment) {
     const auto subject = loaded_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
       return LoadSubject(experiment.subject, context_);
     });
-    const Case made = MakeCase(*subject, experiment);
+    const Case made = MakeCase(*subject, experiment, {});
     CheckFaceOptions(experiment, made);
     for (const TextLines& notes :
          {made.notes, ExplainUnusedRules(experiment, made, loaded_, context_)}) {

@@ -201,7 +201,7 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
     return cache.Get<SubjectData>(StageKey("subject", e.subject),
                                   [&] { return LoadSubject(e.subject, context); });
   });
-  Case subject = MakeCase(*data, e);
+  Case subject = MakeCase(*data, e, context);
   const auto shell = step("fill skull", [&] {
     return cache.Get<TriMesh>(StageKey("shell", e.subject, e.fill),
                               [&] { return FillUpright(*data, e.fill, context); });

@@ -50,6 +50,19 @@ double DepthSd_mm(const TableDepthOptions& options, const Dowel& dowel) {
   return options.own * PublishedSd_mm(dowel);
 }
 
+namespace {
+
+// How far a dowel's depth may be off. A measured depth is exact unless it states a deviation, as an
+// interpolated one does.
+double AlongSd_mm(const TableDepthOptions* from_table, const Dowel& dowel) {
+  if (from_table != nullptr) {
+    return DepthSd_mm(*from_table, dowel);
+  }
+  return std::isfinite(dowel.sd_mm) ? dowel.sd_mm : 0;
+}
+
+}  // namespace
+
 ImplicitSpread ImplicitSpread_mm(const ImplicitSpreadOptions& options, const TriMesh& implicit,
                                  const TriMesh& shell, std::span<const Dowel> dowels,
                                  const TableDepthOptions* table, int threads) {
@@ -116,7 +129,7 @@ ShapeTarget PriorTarget(const FacePrior& prior, std::span<const Dowel> dowels,
          .at = at->second,
          .position = dowel.Tip(),
          .direction = dowel.direction,
-         .along_sd_mm = from_table == nullptr ? 0 : DepthSd_mm(*from_table, dowel),
+         .along_sd_mm = AlongSd_mm(from_table, dowel),
          .shared_sd_mm = from_table == nullptr ? 0 : from_table->shared * PublishedSd_mm(dowel)});
     if (own == prior.sites.end()) {
       continue;

@@ -65,6 +65,10 @@ constexpr Definition kDefinitions[] = {
     {"sC", "the outer edge of the upper jaw's bone above the crown of the canine"},
     {"iC", "the outer edge of the lower jaw's bone below the crown of the canine"},
     {"mmb", "the lower border of the lower jaw, halfway between chin and angle"},
+    {"ut", "the temple 45 mm behind and 45 mm above the lateral orbit"},
+    {"tf", "the front of the temporal fossa, 15 mm behind and 42 mm above the lateral orbit"},
+    {"ma", "the ramus below the arch, 5 mm before the middle of zygomatic arch and occlusal line"},
+    {"pa", "the rear part of the ramus, halfway between supraglenoid and gonion"},
 };
 
 // The ids of the tables that have the site, as "a"; as "a (part)" if cells of the row are missing.
@@ -122,7 +126,7 @@ Numbers and names are those of the thesis's tables (Rhine).
 constexpr const char* kBetweenSites = R"md(
 ## Further sites of tables
 
-The standard network and the generic face lack them. A landmark may stand at one: its table gives the depth, the dowel joins the network, and the ray
+The standard network and the generic face lack them. No published table has the last four pairs; `landmarks: {carried: people}` places `ut` and `tf`. A landmark may stand at one: its table gives the depth, the dowel joins the network, and the ray
 of the dowel tells where it meets the generic face. An experiment can also place one, or a site of its own:
 
 ```yaml

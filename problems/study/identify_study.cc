@@ -128,7 +128,8 @@ Json ProbeJson(const ProbeMatch& probe) {
 }  // namespace
 
 KnownFace MakeKnownFace(const GalleryEntry& entry, const RunContext& context) {
-  const Case person = MakeCase(LoadSubject(entry.experiment.subject, context), entry.experiment);
+  const Case person =
+      MakeCase(LoadSubject(entry.experiment.subject, context), entry.experiment, context);
   if (!person.skin) {
     throw InputError(fmt::format(
         "gallery: {} has no true skin for comparison; give subject.skin, or take this person out",

@@ -3,6 +3,7 @@
 // def. 2.1).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <span>
@@ -84,12 +85,19 @@ using LandmarksKept = std::variant<KeepAll, KeepSpread, KeepNames, KeepRandom>;
 std::vector<bool> KeptSites(const LandmarksKept& kept, std::span<const std::string> sites,
                             std::span<const Vec3> points);
 
+// The dowels of a person's skull at sites that its landmarks lack.
+enum class CarriedSites { kNone, kPeople };
+constexpr auto EnumNames(CarriedSites) {
+  return std::to_array<std::string_view>({"none", "people"});
+}
+
 struct PlaceOptions {
   double max_distance_mm = 3;
   double normal_radius_mm = 3;
   double max_misfit_mm = 25;
   double max_opening_deg = 15;
   LandmarksKept keep = KeepAll{};
+  CarriedSites carried = CarriedSites::kNone;
   double noise_mm = 0;
   std::uint64_t random_seed = 1;
 };
@@ -129,6 +137,13 @@ void Fields(Visitor& visit, PlaceOptions& o) {
                          "landmarks are checked for mistakes, and scores use all of them. As an "
                          "axis of a study: [all, {type: spread, n: 16}, {type: spread, n: 8}]"},
         o.keep);
+  visit(FieldInfo{.name = "carried",
+                  .doc = "dowels at sites of the temple that the landmarks lack (ut, tf), on a "
+                         "person's skull; people: where the mean bone of the people behind "
+                         "`interp: population` has them, laid on this skull, as deep as the table "
+                         "states, or, where depths are measured, as interpolated with its "
+                         "deviation, which changes no other depth; none: no such dowels"},
+        o.carried);
   visit(FieldInfo{.name = "noise_mm",
                   .unit = "mm",
                   .min = 0,

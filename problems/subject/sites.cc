@@ -63,6 +63,10 @@ constexpr StandardLandmark kFurther[] = {
     {0, "sC", "Supra canine", true},
     {0, "iC", "Infra canine", true},
     {0, "mmb", "Mid-mandibular border", true},
+    {0, "ut", "Upper temple", true},
+    {0, "tf", "Temporal fossa", true},
+    {0, "ma", "Upper masseter", true},
+    {0, "pa", "Parotid region", true},
 };
 
 std::vector<Site> MakeSites(std::span<const StandardLandmark> landmarks) {

@@ -29,9 +29,11 @@ const std::vector<Site>& StandardSites();
 // The codes of the standard sites in that order.
 std::vector<std::string> StandardSiteCodes();
 
-// The 13 sites of published tables that the standard network lacks, e.g. "mmb_l" (Caple & Stephan
-// 2016): 5 in the midline, then 4 pairs. A landmark may be placed at one of them and gets the depth
-// of such a table. The generic face and the average skull do not have these sites.
+// The 21 sites that the standard network lacks: 13 of published tables, e.g. "mmb_l" (Caple &
+// Stephan 2016), 5 in the midline and 4 pairs, then 4 pairs at the side of the head, where no table
+// has a site (configs/people/build.py states their places). A landmark may be placed at one of them
+// and gets the depth of a table that has it. The generic face and the average skull do not have
+// these sites.
 const std::vector<Site>& FurtherSites();
 
 // The standard sites, then the further sites.

@@ -71,9 +71,10 @@ VariantFiles FindVariantFiles(const fs::path& folder, BenchVariant variant) {
 
 }  // namespace
 
-Case CoarseCase(const BenchSubject& subject, const Experiment& experiment,
-                const BenchState& state) {
-  return MakeCase(DecimatedSubject(subject, state), experiment, *subject.view_bone);
+Case CoarseCase(const BenchSubject& subject, const Experiment& given, const BenchState& state) {
+  Experiment experiment = given;
+  experiment.landmarks.carried = CarriedSites::kNone;  // to lay people's bone takes longer
+  return MakeCase(DecimatedSubject(subject, state), experiment, *subject.view_bone, {});
 }
 
 BenchFace CoarseFace(const BenchSubject& subject, const Experiment& given, const BenchState& state,

@@ -103,14 +103,19 @@ constexpr int kSketchWidth = 220, kSketchHeight = 260;
 struct Between {
   std::string_view landmark, first, second;
   double share;
+  double behind_mm = 0, above_mm = 0;  // added
 };
-constexpr std::array<Between, 7> kBetween = {{{"mn", "n", "rhi", 0.5},
-                                              {"ss", "rhi", "mp", 0.85},
-                                              {"gn", "pg", "me", 0.5},
-                                              {"ac", "mp", "mio", 0.5},
-                                              {"sC", "mp", "sM2", 0.55},
-                                              {"iC", "id", "iM2", 0.5},
-                                              {"mmb", "me", "go", 0.5}}};
+constexpr std::array<Between, 11> kBetween = {{{"mn", "n", "rhi", 0.5},
+                                               {"ss", "rhi", "mp", 0.85},
+                                               {"gn", "pg", "me", 0.5},
+                                               {"ac", "mp", "mio", 0.5},
+                                               {"sC", "mp", "sM2", 0.55},
+                                               {"iC", "id", "iM2", 0.5},
+                                               {"mmb", "me", "go", 0.5},
+                                               {"ut", "lo", "lo", 0, 45, 45},
+                                               {"tf", "lo", "lo", 0, 15, 42},
+                                               {"ma", "zy", "mr", 0.5, -5, 0},
+                                               {"pa", "sgl", "go", 0.5}}};
 
 std::string OnSideOf(const Site& site, std::string_view landmark) {
   const auto known = std::ranges::find(StandardSites(), landmark, &Site::landmark);
@@ -149,7 +154,8 @@ Vec3 PlaceOf(const Site& site, const TriMesh& skull, const MeshQuery& query,
   }
   const Vec3 a = standard.at(OnSideOf(site, between->first)),
              b = standard.at(OnSideOf(site, between->second));
-  return query.Closest(a + between->share * (b - a)).position;
+  const Vec3 added(0, between->behind_mm, between->above_mm);
+  return query.Closest(a + between->share * (b - a) + added).position;
 }
 
 std::map<std::string, Vec3> PlacesOn(const Phantom& phantom, const MeshQuery& query) {

@@ -41,7 +41,7 @@ std::shared_ptr<const SkullStage> StageOf(const Experiment& experiment) {
 }
 
 Case CaseOf(const Experiment& experiment) {
-  return MakeCase(LoadSubject(experiment.subject, {}), experiment);
+  return MakeCase(LoadSubject(experiment.subject, {}), experiment, {});
 }
 
 const Dowel& At(const std::vector<Dowel>& dowels, const std::string& site) {

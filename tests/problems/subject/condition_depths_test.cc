@@ -285,7 +285,7 @@ TEST(ConditionDepths, ReachesTheCase) {
       SEMBLANCE_SOURCE_DIR, kTTable);
   const auto experiment = ReadConfigText<Experiment>(text, "given.yaml");
   const SubjectData data = LoadSubject(experiment.subject, {});
-  const Case subject = MakeCase(data, experiment);
+  const Case subject = MakeCase(data, experiment, {});
   for (const Dowel& dowel : subject.dowels_on_bone) {
     const auto truth = std::ranges::find(data.landmarks.landmarks, dowel.site, &Landmark::site);
     const std::string code = WithoutSide(dowel.site);

@@ -50,8 +50,8 @@ TEST(Sites, AreDescribedWithTheirName) {
   EXPECT_EQ(DescribeSite("mine"), "mine");
 }
 
-TEST(Sites, FurtherSitesAreThoseOfTheTables) {
-  EXPECT_EQ(FurtherSites().size(), 13u);
+TEST(Sites, FurtherSitesAreThoseOfTheTablesAndOfTheSideOfTheHead) {
+  EXPECT_EQ(FurtherSites().size(), 21u);
   for (const Site& site : FurtherSites()) {
     EXPECT_TRUE(IsFurtherSite(site.code) && !IsStandardSite(site.code)) << site.code;
     EXPECT_EQ(SiteFault(site.code), "");
