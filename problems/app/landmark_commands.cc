@@ -140,7 +140,7 @@ LandmarkFile WithKnown(LandmarkFile known, const Proposal& proposal, const std::
   return file;
 }
 
-// Of several proposed landmarks at one point, keeps the one with the least doubt and lists the
+// Keeps the least doubtful of several proposed landmarks at one point and lists the
 // others as absent, because a run refuses two sites at one point. Points of a person stay.
 LandmarkFile WithoutSamePoints(LandmarkFile file) {
   std::vector<Landmark> by_doubt = file.landmarks, kept;

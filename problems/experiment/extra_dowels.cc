@@ -261,8 +261,8 @@ double ValueAt(const MeshPoint& at, const Triangle& corners, std::span<const dou
 }
 
 // The sites of the temple that people's mean bone has, laid on the skull, and neither a landmark
-// nor one of `sites`. Of three heads, two gain from these sites with interpolated depths and one
-// keeps its error (configs/studies/carried_sites.yaml). The masseter and the parotid region gain
+// nor one of `sites`. With interpolated depths there, one of three heads gains 0.04 mm and two lose
+// less than 0.01 mm (configs/studies/carried_sites.yaml). The masseter and the parotid region gain
 // nothing.
 std::map<std::string, Vec3> CarriedPlaces(const Experiment& experiment, const SubjectData& data,
                                           const Case& subject, const RunContext& context) {
@@ -294,7 +294,8 @@ CarriedDowels MakeCarriedDowels(const Experiment& experiment, const SubjectData&
                                 const MeshQuery& skull, const std::map<std::string, Vec3>& places) {
   CarriedDowels carried;
   for (const auto& [site, place] : places) {
-    Dowel dowel = OnBone(site, place, data, skull, experiment.landmarks);
+    std::map<std::string, double> turns_deg;  // none, because no direction is given
+    Dowel dowel = OnBone(site, place, ExtraSite{}, data, skull, experiment.landmarks, turns_deg);
     dowel.role = PointRole::kInserted;
     if (HasDepth(experiment.tissue, data.landmarks, site)) {
       carried.filled.push_back(std::move(dowel));

@@ -32,7 +32,7 @@ std::vector<Vec3> PointsOn(const HSplineSurface& surface, const DomainGrid& grid
   return points;
 }
 
-// Vertices inside a feature are free. Those with a neighbour outside are its
+// Vertices inside a feature are free. Vertices there with a neighbour outside are its
 // edge, which is locked.
 void HoldFeatures(std::span<const Sphere> features, SpringNet& net) {
   const auto inside = [&](int i, int j) {

@@ -109,8 +109,8 @@ Camera CameraAt(double angle, const Sweep& sweep, double height_mm) {
   return camera;
 }
 
-// Keeps the shadows of the sky, which serve every picture. Those of the lights that move with the
-// camera are dropped after each one, because they would fill the memory.
+// Keeps the shadows of the sky, which serve every picture. The shadows of lights that
+// move with the camera are dropped after each picture, because they would fill the memory.
 class TurnPainter {
  public:
   explicit TurnPainter(const Scene& scene) : scene_(scene) {}

@@ -105,6 +105,20 @@ TEST(CarryToSubject, FindsTheMeanBoneWhereItStands) {
   EXPECT_LT(UpperMedian(off_mm), 0.5);
 }
 
+TEST(CarryToSubject, FindsTheSitesOfTheTempleFromOtherLandmarks) {
+  const Similarity place = TurnedAndLarger();
+  Person person(0, place);
+  std::erase_if(person.dowels, [](const Dowel& dowel) {
+    return dowel.site.starts_with("ut_") || dowel.site.starts_with("tf_");
+  });
+  const std::map<std::string, Vec3> sites =
+      CarryToSubject(CarriedPeople(), person.Input(), RunContext{}).sites;
+  for (const char* const site : {"ut_l", "ut_r", "tf_l", "tf_r"}) {
+    ASSERT_TRUE(sites.contains(site)) << site;
+    EXPECT_LT((sites.at(site) - place * CarriedPeople().sites.at(site).position).norm(), 2) << site;
+  }
+}
+
 TEST(PopulationDepth, APersonWithPeoplesMeanHasItEverywhereForEveryRange) {
   const Person person;
   const DepthField near = person.Depth({.range_mm = 5}), far = person.Depth({.range_mm = 80});
