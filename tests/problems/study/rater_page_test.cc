@@ -22,7 +22,6 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::ThrowsMessage;
-using Json = nlohmann::json;
 
 class RaterPages : public ::testing::Test {
  protected:
@@ -46,15 +45,15 @@ class RaterPages : public ::testing::Test {
   std::vector<fs::path> runs_;
 };
 
-Json DataOf(const std::string& html) {
+nlohmann::json DataOf(const std::string& html) {
   const std::string start = "id=\"data\">";
   const std::size_t at = html.find(start) + start.size();
-  return Json::parse(html.substr(at, html.find("</script>", at) - at));
+  return nlohmann::json::parse(html.substr(at, html.find("</script>", at) - at));
 }
 
 TEST_F(RaterPages, EachPoolHasTheRightPersonOnceAndOthers) {
   const RaterPage page = MakeRaterPage(Options(), {});
-  const Json data = DataOf(page.html);
+  const nlohmann::json data = DataOf(page.html);
   EXPECT_EQ(data["pictures"].size(), 4u + 2u);
   ASSERT_EQ(data["questions"].size(), 2u);
   std::map<std::string, std::set<std::string>> persons;
@@ -70,7 +69,7 @@ TEST_F(RaterPages, EachPoolHasTheRightPersonOnceAndOthers) {
     }
   }
   EXPECT_EQ(asked, (std::set<std::string>{"anna", "berta"}));
-  for (const Json& question : data["questions"]) {
+  for (const nlohmann::json& question : data["questions"]) {
     EXPECT_EQ(question["candidates"].size(), 3u);
     EXPECT_EQ(persons[question["id"]].size(), 3u);
     EXPECT_EQ(own[question["id"]], 1);
@@ -80,11 +79,11 @@ TEST_F(RaterPages, EachPoolHasTheRightPersonOnceAndOthers) {
 // A person has one picture, in whatever pool.
 TEST_F(RaterPages, TheKeyIsThatOfThePictures) {
   const RaterPage page = MakeRaterPage(Options(), {});
-  const Json data = DataOf(page.html);
+  const nlohmann::json data = DataOf(page.html);
   std::map<std::string, int> picture_of;
   std::map<std::pair<std::string, std::string>, int> shown;
-  for (const Json& question : data["questions"]) {
-    for (const Json& candidate : question["candidates"]) {
+  for (const nlohmann::json& question : data["questions"]) {
+    for (const nlohmann::json& candidate : question["candidates"]) {
       shown[{question["id"], candidate["code"]}] = candidate["picture"];
     }
   }
