@@ -39,10 +39,19 @@ struct Person {
       AddThorn(point, place);
     }
     for (const auto& [site, point] : CarriedPeople().sites) {
+      if (IsBesideTheHead(site)) {
+        continue;  // in the fossa a dowel would stand below a filled skull
+      }
       const double log_mm = point.depth.mean + builds * point.depth.loading * point.depth.sd;
       dowels.push_back(
           {site, place * point.position, place.rotation * point.normal, std::exp(log_mm)});
     }
+  }
+
+  // True for the sites that no published table has.
+  static bool IsBesideTheHead(const std::string& site) {
+    const std::string landmark = WithoutSide(site);
+    return landmark == "ut" || landmark == "tf" || landmark == "ma" || landmark == "pa";
   }
 
   void AddThorn(const PeoplePoint& point, const Similarity& place) {
@@ -107,10 +116,7 @@ TEST(CarryToSubject, FindsTheMeanBoneWhereItStands) {
 
 TEST(CarryToSubject, FindsTheSitesOfTheTempleFromOtherLandmarks) {
   const Similarity place = TurnedAndLarger();
-  Person person(0, place);
-  std::erase_if(person.dowels, [](const Dowel& dowel) {
-    return dowel.site.starts_with("ut_") || dowel.site.starts_with("tf_");
-  });
+  const Person person(0, place);
   const std::map<std::string, Vec3> sites =
       CarryToSubject(CarriedPeople(), person.Input(), RunContext{}).sites;
   for (const char* const site : {"ut_l", "ut_r", "tf_l", "tf_r"}) {
