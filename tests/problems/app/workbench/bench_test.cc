@@ -443,7 +443,7 @@ TEST_F(WorkbenchBench, ATurnedDowelIsSavedUndoneAndRunAsItIs) {
   ASSERT_TRUE(file.Find("zy_l")->normal);
   EXPECT_NEAR((Vec3(file.Find("zy_l")->normal->data()) - turned).norm(), 0, 1e-9);
   const auto experiment = ReadConfig<Experiment>(folder_ / "bench/config.yaml");
-  const Case subject = MakeCase(LoadSubject(experiment.subject, {}), experiment);
+  const Case subject = MakeCase(LoadSubject(experiment.subject, {}), experiment, {});
   const Dowel& dowel = *std::ranges::find(subject.dowels_on_bone, "zy_l", &Dowel::site);
   EXPECT_NEAR((dowel.direction - turned).norm(), 0, 1e-9);
   EXPECT_NEAR(subject.turns_deg.at("zy_l"), 0.4 * 180 / 3.14159265358979, 1e-6);
