@@ -5,6 +5,7 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <optional>
@@ -260,28 +261,37 @@ double ValueAt(const MeshPoint& at, const Triangle& corners, std::span<const dou
   return weights > 0 ? sum / weights : kNaN;
 }
 
-// The sites of the temple that people's mean bone has, laid on the skull, and neither a landmark
-// nor one of `sites`. With interpolated depths there, one of three heads gains 0.04 mm and two lose
-// less than 0.01 mm (configs/studies/carried_sites.yaml). The masseter and the parotid region gain
-// nothing.
-std::map<std::string, Vec3> CarriedPlaces(const Experiment& experiment, const SubjectData& data,
-                                          const Case& subject, const RunContext& context) {
-  if (experiment.landmarks.carried == CarriedSites::kNone ||
-      std::holds_alternative<PhantomOptions>(experiment.subject)) {
-    return {};
+// The sites at which dowels are carried. The masseter and the parotid region gain nothing.
+constexpr std::array kCarried = {"tf_l", "tf_r", "ut_l", "ut_r"};
+
+// Places on the bone by site, or why there are none.
+struct CarriedPlaces {
+  std::map<std::string, Vec3> places;
+  std::string fault;
+};
+
+// The carried sites that are neither a landmark nor one of `sites`, where people's mean bone has
+// them when it is laid on the skull. With interpolated depths there, one of three heads gains 0.04
+// mm and two lose less than 0.01 mm (configs/studies/carried_sites.yaml).
+CarriedPlaces FindCarriedPlaces(const Experiment& experiment, const SubjectData& data,
+                                const Case& subject, const RunContext& context) {
+  if (std::holds_alternative<PhantomOptions>(experiment.subject)) {
+    return {{}, "a phantom's skull is not a person's"};
   }
   const interp::DepthInput input{.skull = data.skull,
                                  .normals = {},
                                  .dowels = subject.dowels_on_bone,
                                  .network = subject.network};
-  std::map<std::string, Vec3> places =
-      CarryToSubject(interp::CarriedPeople(), input, context).sites;
-  std::erase_if(places, [&](const auto& place) {
-    const std::string site = WithoutSide(place.first);
-    return (site != "ut" && site != "tf") || experiment.sites.contains(place.first) ||
-           FindLandmark(data.landmarks, place.first) != nullptr;
-  });
-  return places;
+  const interp::CarriedBone bone = CarryToSubject(interp::CarriedPeople(), input, context);
+  CarriedPlaces found{{}, bone.fault};
+  for (const char* const site : kCarried) {
+    const auto place = bone.sites.find(site);
+    if (place != bone.sites.end() && !experiment.sites.contains(site) &&
+        FindLandmark(data.landmarks, site) == nullptr) {
+      found.places.insert(*place);
+    }
+  }
+  return found;
 }
 
 // The dowels at carried sites: those with a depth of their own, then those that take the
@@ -313,6 +323,14 @@ std::string NoteCarried(std::span<const Dowel> dowels, std::string_view depths) 
                      fmt::join(sites, ", "), depths);
 }
 
+std::string WhyNoneIsCarried(const CarriedPlaces& found) {
+  if (!found.fault.empty()) {
+    return found.fault;
+  }
+  return found.places.empty() ? "every site of it is placed already, or lacks bone"
+                              : "no table in use has a depth at its sites";
+}
+
 }  // namespace
 
 TissueOptions WithSiteDepths(const Experiment& experiment, const LandmarkFile& landmarks) {
@@ -336,6 +354,9 @@ TissueOptions WithSiteDepths(const Experiment& experiment, const LandmarkFile& l
           "sites.{}.depth: auto is for a site that is not among the landmarks; give mm", name));
     }
     tissue.set_mm.emplace(name, site.depth->value);
+  }
+  if (experiment.landmarks.carried == CarriedSites::kPeople) {
+    inserted.insert(inserted.end(), kCarried.begin(), kCarried.end());
   }
   LeaveToInserted(inserted, landmarks, tissue);
   return tissue;
@@ -370,8 +391,11 @@ void InsertDowels(const Experiment& experiment, const SubjectData& data, const M
 
 void InsertCarriedDowels(const Experiment& experiment, const SubjectData& data,
                          const MeshQuery& skull, const RunContext& context, Case& subject) {
-  CarriedDowels carried =
-      MakeCarriedDowels(experiment, data, skull, CarriedPlaces(experiment, data, subject, context));
+  if (experiment.landmarks.carried == CarriedSites::kNone) {
+    return;
+  }
+  const CarriedPlaces found = FindCarriedPlaces(experiment, data, subject, context);
+  CarriedDowels carried = MakeCarriedDowels(experiment, data, skull, found.places);
   const std::vector<std::string> notes =
       FillTissueDepths(experiment.tissue, data.landmarks, carried.filled);
   if (!carried.filled.empty()) {
@@ -380,6 +404,10 @@ void InsertCarriedDowels(const Experiment& experiment, const SubjectData& data,
   if (!carried.open.empty()) {
     subject.notes.push_back(
         NoteCarried(carried.open, "as deep as interpolated there; they change no other depth"));
+  }
+  if (carried.filled.empty() && carried.open.empty()) {
+    subject.notes.push_back(
+        fmt::format("landmarks.carried: no dowel is added: {}", WhyNoneIsCarried(found)));
   }
   std::ranges::copy(notes, std::back_inserter(subject.notes));
   std::ranges::move(carried.filled, std::back_inserter(subject.dowels_on_bone));

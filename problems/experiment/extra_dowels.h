@@ -30,8 +30,8 @@ void InsertDowels(const Experiment& experiment, const SubjectData& data, const M
                   Case& subject);
 
 // Adds dowels at the sites of options.landmarks.carried, with one note for those with a depth of
-// their own, and one for those whose depth is to be interpolated. Adds none on a phantom's skull,
-// or where people's mean bone cannot be laid on the skull.
+// their own, and one for those whose depth is to be interpolated. If it adds none, as on a
+// phantom's skull or where people's mean bone cannot be laid on the skull, a note states why.
 void InsertCarriedDowels(const Experiment& experiment, const SubjectData& data,
                          const MeshQuery& skull, const RunContext& context, Case& subject);
 

@@ -51,6 +51,28 @@ const Dowel& At(const std::vector<Dowel>& dowels, const std::string& site) {
 // The middle of the left cheek of the phantom, inside the network.
 constexpr char kCheek[] = "near: [im_l, lo_l]";
 
+TEST(ExtraDowels, AnInterpolatedDepthHasTheDeviationOfItsPlace) {
+  const auto stage =
+      StageOf(Phantom30(fmt::format("mine: {{{}, depth: auto}}", kCheek), {"interp=kriging"}));
+  const DepthStage& depths = *stage->depth_stage;
+  const Dowel& open = At(depths.subject.dowels_on_bone, "mine");
+  const Triangle& t = depths.shell.triangles[MeshQuery(depths.shell).Closest(open.base).triangle];
+  const auto [least, most] =
+      std::minmax({depths.depth.sd_mm[t[0]], depths.depth.sd_mm[t[1]], depths.depth.sd_mm[t[2]]});
+  EXPECT_GT(least, 0);
+  EXPECT_GE(open.sd_mm, least);
+  EXPECT_LE(open.sd_mm, most);
+}
+
+TEST(ExtraDowels, NoneIsCarriedOntoAPhantomAndANoteStatesIt) {
+  const Case usual = CaseOf(Phantom30("")),
+             carried = CaseOf(Phantom30("", {"landmarks.carried=people"}));
+  EXPECT_EQ(carried.dowels_on_bone.size(), usual.dowels_on_bone.size());
+  EXPECT_TRUE(carried.open_dowels.empty());
+  EXPECT_THAT(carried.notes, Contains(HasSubstr("no dowel is added: a phantom's skull")));
+  EXPECT_THAT(usual.notes, Not(Contains(HasSubstr("landmarks.carried"))));
+}
+
 TEST(ExtraDowels, TheInterpolatedDepthChangesNoOtherDowel) {
   const auto before = StageOf(Phantom30(fmt::format("mine: {{{}, depth: auto}}", kCheek)));
   const Dowel& open = At(before->depth_stage->subject.dowels_on_bone, "mine");
