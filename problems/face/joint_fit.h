@@ -85,6 +85,7 @@ struct JointRows {
 };
 JointRows LinearizeJointStep(const VertexModel& model, const JointData& data,
                              const JointWeights& weights, int level, const JointState& state);
+
 // Solves one step and moves the vertices of its level and the parameters by its fraction of the way
 // to the solution. The solution makes least, over the vertices r_i of residual[level], the pose,
 // and the coefficients w and a,

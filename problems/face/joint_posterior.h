@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far the face of a joint fit may be off: the posterior of one of its steps.
+// The posterior of one step of a joint fit: it states how far the face may be off.
 #pragma once
 
 #include <Eigen/Core>

@@ -52,8 +52,8 @@ double DepthSd_mm(const TableDepthOptions& options, const Dowel& dowel) {
 
 namespace {
 
-// How far a dowel's depth may be off. A measured depth is exact unless it states a deviation, as an
-// interpolated one does.
+// The deviation of a dowel's depth in this person. A measured depth is exact unless it states a
+// deviation, as an interpolated one does.
 double AlongSd_mm(const TableDepthOptions* from_table, const Dowel& dowel) {
   if (from_table != nullptr) {
     return DepthSd_mm(*from_table, dowel);

@@ -124,7 +124,7 @@ Numbers and names are those of the thesis's tables (Rhine).
 )md";
 
 constexpr const char* kBetweenSites = R"md(
-## Further sites of tables
+## Further sites
 
 The standard network and the generic face lack them. No published table has the last four pairs; `landmarks: {carried: people}` places `ut` and `tf`. A landmark may stand at one: its table gives the depth, the dowel joins the network, and the ray
 of the dowel tells where it meets the generic face. An experiment can also place one, or a site of its own:

@@ -91,7 +91,7 @@ bool HoldsAt(const DepthBound& bound, const std::string& site);
 // The range at a standard site. Bounds must not contradict each other (BoundFaults).
 DepthRange AllowedAt(std::span<const DepthBound> bounds, const std::string& site);
 
-// What a bound did to one person's depths.
+// The effect of a bound on one person's depths.
 struct BoundEffect {
   std::string name;  // its region and sites: "cheeks, mp"
   std::optional<double> least_mm, most_mm;

@@ -31,8 +31,8 @@ std::vector<std::string> StandardSiteCodes();
 
 // The 21 sites that the standard network lacks: 13 of published tables, e.g. "mmb_l" (Caple &
 // Stephan 2016), 5 in the midline and 4 pairs, then 4 pairs at the side of the head, where no table
-// has a site (configs/people/build.py states their places). A landmark may be placed at one of them
-// and gets the depth of a table that has it. The generic face and the average skull do not have
+// has a site (configs/people/build.py states their places). A landmark may be placed at one of
+// them; a table with the site states its depth. The generic face and the average skull do not have
 // these sites.
 const std::vector<Site>& FurtherSites();
 
