@@ -18,6 +18,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 #include <vector>
@@ -182,12 +183,13 @@ class Connection : public HttpConnection {
   }
 
  private:
-  // Waits until the socket is ready, and transfers.
+  // Waits until the socket is ready, and transfers. Gives up when the client has been idle for too
+  // long, and when the server has been stopped.
   template <class Function>
-  std::ptrdiff_t Transfer(short event, const Function& transfer) const {
+  std::ptrdiff_t Transfer(short event, const Function& transfer) {
     constexpr int kStopCheck_ms = 50;
     const Clock::time_point end = Clock::now() + idle_time_;
-    while (!stop_.stop_requested() && Clock::now() < end) {
+    while (!IsStopped(event) && Clock::now() < end) {
       const ssize_t done = transfer();
       if (done >= 0 || (errno != EAGAIN && errno != EINTR)) {
         return done;
@@ -198,9 +200,19 @@ class Connection : public HttpConnection {
     return -1;
   }
 
+  // A request ends when the server is stopped; a reply has some time to arrive as a whole.
+  bool IsStopped(short event) {
+    constexpr std::chrono::seconds kTimeToFinish{2};
+    if (stop_.stop_requested() && !stopped_) {
+      stopped_ = Clock::now();
+    }
+    return stopped_ && (event != POLLOUT || Clock::now() - *stopped_ > kTimeToFinish);
+  }
+
   int socket_;
   std::chrono::milliseconds idle_time_;
   std::stop_token stop_;
+  std::optional<Clock::time_point> stopped_;  // when a transfer first noticed the stop
   std::string received_;
   std::uint64_t unread_ = 0;  // bytes of the present request
 };

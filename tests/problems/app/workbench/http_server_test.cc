@@ -328,6 +328,22 @@ TEST_F(WorkbenchServer, AStopDuringTheStartEndsTheServer) {
   }  // each thread is stopped and joined here
 }
 
+TEST(HttpServer, AReplyThatHasBegunArrivesWholeWhenTheServerIsStopped) {
+  const std::string body(64 << 20, 'x');  // more than the buffers of a connection hold
+  std::stop_source stop;
+  HttpServer server([&](const PageRequest&) { return PageReply{200, "text/plain", body, {}}; }, {});
+  std::jthread serving([&] { server.Serve(stop.get_token()); });
+  Client client(server.Port());
+  client.Send(fmt::format("GET {} HTTP/1.1\r\nHost: 127.0.0.1:{}\r\n\r\n",
+                          server.Url().substr(server.Url().rfind('/', server.Url().size() - 2)),
+                          server.Port()));
+  std::string reply = client.Receive("\r\n\r\nx");
+  stop.request_stop();
+  std::this_thread::sleep_for(std::chrono::milliseconds(200));  // the server notices the stop
+  reply += client.Receive();
+  EXPECT_EQ(reply.size() - reply.find("\r\n\r\n") - 4, body.size());
+}
+
 TEST(HttpHead, IsReadToItsEndWithTheSizeOfTheBody) {
   const auto read = [](const std::string& text) { return ReadHead(text, {}); };
   const std::string get = "GET /a HTTP/1.1\r\nHost: x\r\n\r\n";
