@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <iterator>
 #include <limits>
 #include <map>
@@ -239,7 +240,8 @@ class JointFitter {
     context_.ThrowIfStopped();
     ObserveDowels();
     levels_.push_back(SolveJointStep(model_, data_, weights_, step, state_));
-    Assemble();
+    MoveModel(state_, *made_.prior);
+    surface_ = Assemble(*made_.prior, state_);
     SlideDowels();
   }
 
@@ -280,20 +282,20 @@ class JointFitter {
   }
 
   // The face as one H-spline: at every level the model's net and the deviation from it.
-  void Assemble() {
-    MoveModel();
-    surface_ =
-        MakeFaceSurface(*made_.prior, in_.prior->face, in_.prior->on_template, surface_.shape());
+  HSplineSurface Assemble(const ShapeEstimate& estimate, const JointState& state) const {
+    HSplineSurface surface =
+        MakeFaceSurface(estimate, in_.prior->face, in_.prior->on_template, surface_.shape());
     std::vector<ControlNet> nets;
-    for (int level = 0; level <= surface_.shape().max_level; ++level) {
-      ControlNet& net = nets.emplace_back(surface_.Net(level));
+    for (int level = 0; level <= surface.shape().max_level; ++level) {
+      ControlNet& net = nets.emplace_back(surface.Net(level));
       for (std::size_t k = 0; k < net.vertices.size(); ++k) {
-        net.vertices[k] += state_.residual[level].vertices[k];
+        net.vertices[k] += state.residual[level].vertices[k];
       }
     }
     for (std::size_t level = 0; level < nets.size(); ++level) {
-      surface_.SetNet(static_cast<int>(level), nets[level]);
+      surface.SetNet(static_cast<int>(level), nets[level]);
     }
+    return surface;
   }
 
   // Growth of sigma away from what was observed, for example where no bone was scanned.
@@ -319,13 +321,34 @@ class JointFitter {
     return places;
   }
 
-  SigmaGrid FindSigma() {
+  // Adds sigma and the random faces.
+  void AddSpread() {
+    const std::vector<std::uint64_t> draws =
+        in_.draws_faces ? ListDraws(options_.use, in_.experiment.uncertainty)
+                        : std::vector<std::uint64_t>();
+    if (!in_.tells_sigma && draws.empty()) {
+      return;
+    }
+    ObserveDowels();  // where the last step has brought them
+    const int level = levels_.back().level;
+    const JointPosterior posterior(model_, data_, weights_, options_.use.estimate.surface_length_mm,
+                                   level, state_);
+    if (in_.tells_sigma) {
+      made_.sigma = FindSigma(posterior, level);
+    }
+    std::vector<HSplineSurface> drawn;
+    for (const std::uint64_t random_seed : draws) {
+      const JointState state = posterior.Draw(random_seed);
+      ShapeEstimate estimate = *made_.prior;
+      MoveModel(state, estimate);
+      drawn.push_back(Assemble(estimate, state));
+    }
+    TakeDraws(options_.use, std::move(drawn), made_);
+  }
+
+  SigmaGrid FindSigma(const JointPosterior& posterior, int level) const {
     constexpr double kUnexpressed = 0.8;  // chosen by configs/studies/joint_sigma.yaml
     const ShapeFitOptions& estimate = options_.use.estimate;
-    const int level = levels_.back().level;
-    ObserveDowels();  // where the last step has brought them
-    const JointPosterior posterior(model_, data_, weights_, estimate.surface_length_mm, level,
-                                   state_);
     SigmaGrid sigma{.grid = CornersOfPatches(surface_.shape(), level), .sigma_mm = {}};
     std::vector<Vec2> uv;
     std::vector<Vec3> normals;
@@ -361,26 +384,16 @@ class JointFitter {
     }
     made_.fitted = {std::move(seeding_), std::move(points), std::move(fit)};
     MeasureResiduals(made_.fitted);
-    if (in_.tells_sigma) {
-      made_.sigma = FindSigma();
-    }
+    AddSpread();
     return std::move(made_);
   }
 
-  // The model at the solution, and with it the shapes that were drawn.
-  void MoveModel() {
-    ShapeEstimate& estimate = *made_.prior;
-    estimate.parameters = state_.parameters;
-    estimate.coefficients = state_.parameters.coefficients;
-    estimate.subject_from_model = MakeSimilarity(state_.frame, state_.parameters);
-    const std::vector<Vec3> moved =
-        PlacedPoints(state_.frame, in_.prior->face.model, estimate.field, state_.parameters);
-    for (std::vector<Vec3>& drawn : estimate.drawn) {
-      for (std::size_t v = 0; v < drawn.size(); ++v) {
-        drawn[v] += moved[v] - estimate.points[v];
-      }
-    }
-    estimate.points = moved;
+  void MoveModel(const JointState& state, ShapeEstimate& estimate) const {
+    estimate.parameters = state.parameters;
+    estimate.coefficients = state.parameters.coefficients;
+    estimate.subject_from_model = MakeSimilarity(state.frame, state.parameters);
+    estimate.points =
+        PlacedPoints(state.frame, in_.prior->face.model, estimate.field, state.parameters);
   }
 
   const JointFace& options_;
@@ -406,12 +419,10 @@ class JointFitter {
 MadeFace MakeJointFace(const JointFace& options, PlacedTemplate placed, const FaceInput& in,
                        const RunContext& context) {
   FaceInput of_start = in;
-  of_start.tells_sigma = false;  // sigma is that of the last step
+  of_start.tells_sigma = of_start.draws_faces = false;  // both are of the last step
   JointFitter fitter(options, FindLikelyFace(options.use, std::move(placed), of_start, context), in,
                      context);
-  MadeFace made = fitter.Run();
-  TakeDraws(options.use, *in.prior, made);
-  return made;
+  return fitter.Run();
 }
 
 }  // namespace semblance::problems

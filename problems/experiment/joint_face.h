@@ -22,9 +22,9 @@ namespace semblance::problems {
 //
 // Then SolveJointStep moves vertices, coefficients and pose by the step's fraction. Dowels, seeds
 // and marks have Huber losses of the widths of `estimate`. `made.prior` has the model at the
-// solution. Its draws are those of the start, moved with it; its residuals and weights of tips and
-// marks are those of the start.
+// solution; its residuals and weights of tips and marks are those of the start.
 //
+// Random faces are drawn from JointPosterior at the end of the last step.
 // Sigma (in.tells_sigma) is that of JointPosterior at the end of the last step, at the corners of
 // the patches of its level. Two parts are added in squares, as by EstimateShape:
 // 0.8 estimate.discrepancy_mm, because the deviation of the surface from the model expresses the

@@ -64,7 +64,8 @@ RuleMarks ApplySubjectRules(const FaceInput& in, const FacePrior& prior) {
                                 : RuleMarks();
 }
 
-// The random seeds of the faces to draw. The first one may replace the most likely face.
+}  // namespace
+
 std::vector<std::uint64_t> ListDraws(const PriorUse& use, const UncertaintyOptions& options) {
   std::vector<std::uint64_t> random_seeds;
   if (use.draw > 0) {
@@ -75,8 +76,6 @@ std::vector<std::uint64_t> ListDraws(const PriorUse& use, const UncertaintyOptio
   }
   return random_seeds;
 }
-
-}  // namespace
 
 void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
                          const TableDepthOptions& table, std::span<const Vec3> on_mean,
@@ -104,17 +103,22 @@ void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
   }
 }
 
-void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made) {
-  const HSplineSurface likely = made.fitted.fit.surface;
+std::vector<HSplineSurface> MoveAsDrawn(const LoadedPrior& prior, const MadeFace& made) {
+  std::vector<HSplineSurface> drawn;
   for (std::size_t k = 0; k < made.prior->drawn.size(); ++k) {
-    HSplineSurface drawn = MovedAsDrawn(likely, *made.prior, k, prior.face, prior.on_template);
-    if (use.draw > 0 && k == 0) {
-      made.fitted.fit.surface = std::move(drawn);
-      MeasureResiduals(made.fitted);
-    } else {
-      made.samples.push_back(std::move(drawn));
-    }
+    drawn.push_back(
+        MovedAsDrawn(made.fitted.fit.surface, *made.prior, k, prior.face, prior.on_template));
   }
+  return drawn;
+}
+
+void TakeDraws(const PriorUse& use, std::vector<HSplineSurface> drawn, MadeFace& made) {
+  if (use.draw > 0) {
+    made.fitted.fit.surface = std::move(drawn.front());
+    MeasureResiduals(made.fitted);
+    drawn.erase(drawn.begin());
+  }
+  made.samples = std::move(drawn);
 }
 
 // A table's deviations are those of the population. The options split them into the errors that a
@@ -142,7 +146,9 @@ LikelyFace FindLikelyFace(const PriorUse& use, PlacedTemplate placed, const Face
   }
   RuleMarks rules = ApplySubjectRules(in, prior.face);
   target.marks = std::move(rules.marks);
-  target.draws = ListDraws(use, in.experiment.uncertainty);
+  if (in.draws_faces) {
+    target.draws = ListDraws(use, in.experiment.uncertainty);
+  }
   target.compute_spread = in.tells_sigma || !target.draws.empty();
   ShapeEstimate shape = Estimate(prior.face, use, target, context);
   for (std::size_t k = 0; k < rules.rules.size(); ++k) {

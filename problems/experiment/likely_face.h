@@ -2,6 +2,9 @@
 // The most likely face of a statistical model, given a subject's dowels and implicit face.
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "problems/experiment/make_face.h"
 #include "problems/face/face_source.h"
 
@@ -22,9 +25,15 @@ LikelyFace FindLikelyFace(const PriorUse& use, PlacedTemplate placed, const Face
 void WidenWhereNoDowelIs(const FacePrior& prior, std::span<const Dowel> dowels,
                          const TableDepthOptions& table, std::span<const Vec3> on_mean,
                          std::vector<double>& sigma_mm);
-// Adds uncertainty.samples random faces to `made`. With use.draw > 0 a random face also replaces
-// the face itself.
-void TakeDraws(const PriorUse& use, const LoadedPrior& prior, MadeFace& made);
+
+// The random seeds of the faces to draw: use.draw, if it is not 0, and those of
+// uncertainty.samples.
+std::vector<std::uint64_t> ListDraws(const PriorUse& use, const UncertaintyOptions& options);
+// The face moved as each shape that the estimate drew.
+std::vector<HSplineSurface> MoveAsDrawn(const LoadedPrior& prior, const MadeFace& made);
+// Takes the faces that were drawn with the seeds of ListDraws: the first one replaces the face
+// itself if use.draw > 0, and the others are made.samples.
+void TakeDraws(const PriorUse& use, std::vector<HSplineSurface> drawn, MadeFace& made);
 
 // The part of a table's deviations by which each depth errs alone, and the part that all share.
 TableDepthOptions SplitTableError(const TableDepthOptions& table, const Experiment& experiment);

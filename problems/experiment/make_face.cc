@@ -240,7 +240,7 @@ MadeFace MakeFace(const PriorFace& o, PlacedTemplate placed, const FaceInput& in
                   const RunContext& context) {
   MadeFace made = FindLikelyFace(o.use, std::move(placed), in, context).made;
   MeetDowels(*in.prior, made);
-  TakeDraws(o.use, *in.prior, made);
+  TakeDraws(o.use, MoveAsDrawn(*in.prior, made), made);
   return made;
 }
 
@@ -299,7 +299,7 @@ MadeFace MakeFace(const PriorThenFit& o, PlacedTemplate placed, const FaceInput&
       .features = FeaturesOn(*made.prior, in.prior->face),
       .trust = &o.seed_trust};
   made.fitted = FitFace(PlanFitOnPrior(o, in), made.placed, in, known, context);
-  TakeDraws(o.use, *in.prior, made);
+  TakeDraws(o.use, MoveAsDrawn(*in.prior, made), made);
   return made;
 }
 

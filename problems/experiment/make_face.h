@@ -48,6 +48,7 @@ struct FaceInput {
   const TriMesh& shell;
   const ImplicitSurface* field = nullptr;  // the surface of `implicit`, to lay seeds on it
   bool tells_sigma = true;                 // false: a prior's face gets no sigma, which saves time
+  bool draws_faces = true;                 // false: no random faces are drawn
 };
 
 // The standard deviation of a face along its normal, mm, at the points of a grid of its domain.

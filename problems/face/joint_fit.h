@@ -6,7 +6,6 @@
 
 #include <Eigen/Core>
 #include <Eigen/SparseCore>
-#include <array>
 #include <string>
 #include <vector>
 
@@ -58,7 +57,7 @@ struct JointData {
 struct JointWeights {
   ResidualFieldOptions residual;
   ShapePrior prior;
-  std::array<double, 7> start_pose = {};  // mean of the pose's prior
+  ShapePose start_pose = kUprightPose;  // mean of the pose's prior
 };
 
 // The face between two steps: S(u,v) = model(u,v; pose, w, a) + R(u,v). R is the deviation from the
@@ -76,10 +75,13 @@ struct JointState {
 JointState StartJoint(const HSplineShape& shape, const ShapeFrame& frame,
                       const ShapeParameters& parameters);
 
+// Adds `move` to R's vertices of the level; the nets of finer levels move along with it.
+void MoveDeviation(const HSplineShape& shape, int level, ControlNet move, JointState& state);
+
 // The Jacobian of a step's problem at `state`, part by part, times the roots of weights and losses.
-// Columns: pose (7), coefficients, field, then x, y and z of each vertex of residual[level]. Rows:
-// those of the observations in their order, of MakeFieldRows (three each), and one per parameter of
-// the model. Throws InputError for a level that the model does not have.
+// Columns: a step of the pose (7), coefficients, field, then x, y and z of each vertex of
+// residual[level]. Rows: those of the observations in their order, of MakeFieldRows (three each),
+// and one per parameter of the model. Throws InputError for a level that the model does not have.
 struct JointRows {
   Eigen::SparseMatrix<double> dowels, seeds, marks, residual_field, face_model;
 };

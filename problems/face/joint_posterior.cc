@@ -2,10 +2,13 @@
 #include "problems/face/joint_posterior.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <utility>
 
 #include "fitting/least_squares/sparse_factor.h"
+#include "fitting/uncertainty/error_propagation.h"
+#include "surfaces/base/random.h"
 
 namespace semblance::problems {
 namespace {
@@ -51,6 +54,28 @@ SparseMatrix SmoothRows(const SparseMatrix& jacobian, const std::vector<SmoothEr
   return choice * jacobian;
 }
 
+SparseMatrix WithoutRows(const SparseMatrix& matrix, const std::vector<SmoothError>& errors) {
+  Eigen::VectorXd kept = Eigen::VectorXd::Ones(matrix.rows());
+  for (const SmoothError& error : errors) {
+    kept[error.row] = 0;
+  }
+  return kept.asDiagonal() * matrix;
+}
+
+Eigen::VectorXd DrawNormals(Eigen::Index count, Random& random) {
+  return Eigen::VectorXd::NullaryExpr(count, [&random] { return random.Normal(); });
+}
+
+// H, lower triangle.
+SparseMatrix MakeInformation(const JointRows& rows) {
+  SparseMatrix sum(rows.face_model.cols(), rows.face_model.cols());
+  for (const SparseMatrix* const part :
+       {&rows.dowels, &rows.seeds, &rows.marks, &rows.residual_field, &rows.face_model}) {
+    sum += SparseMatrix(part->transpose()) * *part;
+  }
+  return sum.triangularView<Eigen::Lower>();
+}
+
 }  // namespace
 
 // M = H + smooth' errors smooth + shared shared' + diag(people).
@@ -60,8 +85,10 @@ struct JointPosterior::Parts {
   Eigen::MatrixXd errors;  // their covariance, without that of independent errors, which H has
   Eigen::VectorXd shared;  // one standard deviation of the shared error, as a gradient
   Eigen::VectorXd people;  // what people differ more than H has it
+  JointRows independent;   // the other rows; their errors are independent, with deviation 1
 
-  void AddObservations(const std::vector<SurfaceObservation>& seen, const SparseMatrix& jacobian,
+  // Takes the rows with a smooth error out of the observations' rows.
+  void AddObservations(const std::vector<SurfaceObservation>& seen, SparseMatrix& jacobian,
                        double smooth_length_mm, const VertexModel& model, const JointState& state) {
     std::vector<SmoothError> smooth_errors;
     Eigen::VectorXd shift = Eigen::VectorXd::Zero(jacobian.rows());
@@ -80,7 +107,25 @@ struct JointPosterior::Parts {
       smooth = SmoothRows(jacobian, smooth_errors);
       errors = SmoothCovariance(smooth_errors, smooth_length_mm);
       errors.diagonal().array() -= 1;
+      jacobian = WithoutRows(jacobian, smooth_errors);
     }
+  }
+
+  // A gradient with the covariance M.
+  Eigen::VectorXd DrawGradient(Random& random) const {
+    Eigen::VectorXd gradient = shared * random.Normal();
+    for (const SparseMatrix* const part :
+         {&independent.dowels, &independent.seeds, &independent.marks, &independent.residual_field,
+          &independent.face_model}) {
+      gradient += part->transpose() * DrawNormals(part->rows(), random);
+    }
+    if (smooth.rows() > 0) {
+      Eigen::MatrixXd covariance = errors;
+      covariance.diagonal().array() += 1;
+      const Eigen::MatrixXd root = fitting::PivotedRoot(std::move(covariance), 1e-9);
+      gradient += smooth.transpose() * (root * DrawNormals(root.cols(), random));
+    }
+    return gradient;
   }
 
   // The diagonal of A' H^-1 M H^-1 A.
@@ -100,24 +145,21 @@ JointPosterior::JointPosterior(const VertexModel& model, const JointData& data,
                                const JointWeights& weights, double smooth_length_mm, int level,
                                const JointState& state)
     : model_(model), level_(level), state_(state) {
-  const JointRows rows = LinearizeJointStep(model, data, weights, level, state);
   auto parts = std::make_unique<Parts>();
-  const Eigen::Index unknowns = rows.face_model.cols();
-  parts->shared = Eigen::VectorXd::Zero(unknowns);
-  SparseMatrix information(unknowns, unknowns);
-  for (const SparseMatrix* const part :
-       {&rows.dowels, &rows.seeds, &rows.marks, &rows.residual_field, &rows.face_model}) {
-    information += SparseMatrix(part->transpose()) * *part;
-  }
-  parts->information = std::make_unique<const SparseFactor>(
-      SparseMatrix(information.triangularView<Eigen::Lower>()), 0);
+  parts->independent = LinearizeJointStep(model, data, weights, level, state);
+  JointRows& rows = parts->independent;
+  parts->information = std::make_unique<const SparseFactor>(MakeInformation(rows), 0);
+  parts->shared = Eigen::VectorXd::Zero(rows.face_model.cols());
   parts->AddObservations(data.dowels, rows.dowels, smooth_length_mm, model, state);
   parts->AddObservations(data.seeds, rows.seeds, smooth_length_mm, model, state);
   const Eigen::Index modes = state.parameters.coefficients.size();
   const ShapePrior& prior = weights.prior;
-  parts->people = Eigen::VectorXd::Zero(unknowns);
+  parts->people = Eigen::VectorXd::Zero(rows.face_model.cols());
   parts->people.segment(7, modes).setConstant(
       (std::pow(prior.population_sd / prior.mode_sd, 2) - 1) / std::pow(prior.mode_sd, 2));
+  Eigen::VectorXd among_people = Eigen::VectorXd::Ones(rows.face_model.cols());
+  among_people.segment(7, modes).setConstant(prior.population_sd / prior.mode_sd);
+  rows.face_model = rows.face_model * among_people.asDiagonal();
   parts_ = std::move(parts);
 }
 
@@ -153,6 +195,23 @@ std::vector<double> JointPosterior::DeviationsAlong(std::span<const Vec2> uv,
     }
   }
   return deviations;
+}
+
+JointState JointPosterior::Draw(std::uint64_t random_seed) const {
+  JointState drawn = state_;
+  if (!parts_->information->usable()) {
+    return drawn;
+  }
+  Random random(random_seed);
+  const Eigen::VectorXd step = parts_->information->Solve(parts_->DrawGradient(random));
+  const Eigen::Index model_size = state_.parameters.size();
+  drawn.parameters = MoveParameters(state_.parameters, step.head(model_size));
+  ControlNet move = state_.residual[level_];
+  for (std::size_t k = 0; k < move.vertices.size(); ++k) {
+    move.vertices[k] = step.segment<3>(model_size + 3 * static_cast<Eigen::Index>(k));
+  }
+  MoveDeviation(model_.shape, level_, std::move(move), drawn);
+  return drawn;
 }
 
 }  // namespace semblance::problems

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <memory>
 #include <span>
 #include <vector>
@@ -32,6 +33,10 @@ class JointPosterior {
   // if H is not positive definite. One thread; the same input gives the same bytes.
   std::vector<double> DeviationsAlong(std::span<const Vec2> uv,
                                       std::span<const Vec3> directions) const;
+
+  // A face drawn from the posterior; the state itself if H is not positive definite. The same seed
+  // gives the same bytes.
+  JointState Draw(std::uint64_t random_seed) const;
 
  private:
   struct Parts;

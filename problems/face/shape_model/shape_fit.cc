@@ -1,10 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/face/shape_model/shape_fit.h"
 
-#include <ceres/cost_function.h>
-#include <ceres/loss_function.h>
-#include <ceres/problem.h>
-#include <ceres/solver.h>
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -17,7 +13,7 @@
 #include <span>
 #include <utility>
 
-#include "problems/face/shape_model/shape_cost.h"
+#include "problems/face/shape_model/face_problem.h"
 #include "problems/face/shape_model/shape_model.h"
 #include "problems/face/shape_model/shape_posterior.h"
 #include "surfaces/base/error.h"
@@ -209,7 +205,7 @@ class ShapeEstimator {
         prior_{.scale_sd = options.scale_sd,
                .mode_sd = options.mode_sd,
                .population_sd = options.population_sd},
-        frame_(StartFrame(model, target.start)) {
+        frame_(CentredFrame(model)) {
     const std::vector<int> centres = SpreadPoints(model.mean.points, options.field.centres);
     field_ = SmoothFieldFactor(model.mean.points, centres, FeaturePositions(target), options.field);
     parameters_ = StartParameters(frame_, target.start, model.Modes(), std::ssize(centres));
@@ -244,7 +240,7 @@ class ShapeEstimator {
   std::vector<DrawnPoint> drawn_;
 
   ShapeParameters parameters_;
-  std::array<double, 7> start_pose_;
+  ShapePose start_pose_;
   TriMesh placed_;             // the present shape
   std::vector<Vec3> normals_;  // one per point of placed_
   std::vector<ShapeObservation> seen_;
@@ -304,26 +300,16 @@ void ShapeEstimator::ObserveSurface() {
 }
 
 void ShapeEstimator::Solve(bool pose_alone) {
-  ceres::Problem problem;
-  AddShapePriors(prior_, start_pose_, parameters_, problem);
-  const std::vector<double*> blocks = ShapeBlocks(parameters_);
+  FaceProblem problem(frame_, parameters_);
+  problem.BeginPart("face_model");
+  problem.AddPriors(prior_, start_pose_);
+  problem.BeginPart("observations");
   for (const ShapeObservation& one : seen_) {
-    auto* const loss = new ceres::ScaledLoss(new ceres::HuberLoss(one.loss_width), one.weight,
-                                             ceres::TAKE_OWNERSHIP);
-    problem.AddResidualBlock(MakeShapeCost(frame_, one), loss, blocks);
+    problem.Observe(one);
   }
-  if (pose_alone) {
-    for (double* const block : blocks | std::views::drop(1)) {  // all but the pose
-      problem.SetParameterBlockConstant(block);
-    }
-  }
-  ceres::Solver::Options solver;
-  solver.linear_solver_type = ceres::DENSE_NORMAL_CHOLESKY;
-  solver.max_num_iterations = 4;  // the observations change with the next round
-  solver.logging_type = ceres::SILENT;
-  ceres::Solver::Summary summary;
-  ceres::Solve(solver, &problem, &summary);
-  usable_ = usable_ && summary.IsSolutionUsable();
+  constexpr int kIterations = 4;  // the observations change with the next round
+  usable_ = problem.Solve({.max_iterations = kIterations, .moves_pose_alone = pose_alone}).usable &&
+            usable_;
 }
 
 // The largest distance between the points of two rounds.

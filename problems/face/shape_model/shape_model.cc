@@ -67,23 +67,6 @@ Vec3 FindPosition(const ModelPoint& at, const TriMesh& mean, const std::vector<V
 
 namespace {
 
-Mat3 Rotation(const Vec3& omega) {
-  const double angle = omega.norm();
-  return angle == 0 ? Mat3(Mat3::Identity())
-                    : Mat3(Eigen::AngleAxisd(angle, omega / angle).toRotationMatrix());
-}
-
-// exp(omega + d) = exp(J d) exp(omega) to first order in d (Chirikjian 2011, 10.86).
-Mat3 LeftJacobian(const Vec3& omega) {
-  const double angle = omega.norm();
-  const Mat3 cross = CrossMatrix(omega);
-  if (angle < 1e-6) {
-    return Mat3::Identity() + cross / 2;
-  }
-  return Mat3::Identity() + (1 - std::cos(angle)) / (angle * angle) * cross +
-         (angle - std::sin(angle)) / (angle * angle * angle) * cross * cross;
-}
-
 Vec3 MeanPoint(const std::vector<Vec3>& points) {
   const Vec3 sum = std::accumulate(points.begin(), points.end(), Vec3(Vec3::Zero()));
   return sum / static_cast<double>(points.size());
@@ -95,26 +78,35 @@ std::span<const double> AsSpan(const Eigen::VectorXd& v) {
 
 }  // namespace
 
-ShapeFrame StartFrame(const ShapeModel& model, const Similarity& subject_from_model) {
-  return {subject_from_model.rotation, MeanPoint(model.mean.points)};
-}
+ShapeFrame CentredFrame(const ShapeModel& model) { return {MeanPoint(model.mean.points)}; }
 
 ShapeParameters StartParameters(const ShapeFrame& frame, const Similarity& subject_from_model,
                                 Eigen::Index modes, Eigen::Index centres) {
-  ShapeParameters parameters;
-  parameters.pose[0] = std::log(subject_from_model.scale);
-  Vec3::Map(&parameters.pose[4]) = subject_from_model * frame.centre;
-  parameters.coefficients = Eigen::VectorXd::Zero(modes);
-  parameters.field = Eigen::VectorXd::Zero(3 * centres);
-  return parameters;
+  return {.pose = MakePose(subject_from_model.scale, subject_from_model.rotation,
+                           subject_from_model * frame.centre),
+          .coefficients = Eigen::VectorXd::Zero(modes),
+          .field = Eigen::VectorXd::Zero(3 * centres)};
+}
+
+ShapeParameters MoveParameters(const ShapeParameters& from, const Eigen::VectorXd& step) {
+  return {.pose = MovePose(from.pose, step.head<7>()),
+          .coefficients = from.coefficients + step.segment(7, from.coefficients.size()),
+          .field = from.field + step.segment(7 + from.coefficients.size(), from.field.size())};
+}
+
+ShapeParameters PartOfWay(const ShapeParameters& from, const ShapeParameters& to, double fraction) {
+  Eigen::VectorXd step(from.size());
+  step << StepBetween(from.pose, to.pose), to.coefficients - from.coefficients,
+      to.field - from.field;
+  return MoveParameters(from, fraction * step);
 }
 
 Similarity MakeSimilarity(const ShapeFrame& frame, const ShapeParameters& parameters) {
   Similarity similarity;
   similarity.scale = std::exp(parameters.pose[0]);
-  similarity.rotation = Rotation(Vec3::Map(&parameters.pose[1])) * frame.start_rotation;
+  similarity.rotation = PoseRotation(parameters.pose);
   similarity.translation =
-      Vec3::Map(&parameters.pose[4]) - similarity.scale * (similarity.rotation * frame.centre);
+      Vec3::Map(&parameters.pose[5]) - similarity.scale * (similarity.rotation * frame.centre);
   return similarity;
 }
 
@@ -158,16 +150,15 @@ Vec3 PlacedPoint(const ShapeFrame& frame, const ShapeRow& row, std::span<const d
   if (row.field.size() > 0) {
     local += ConstColumns(field.data(), 3, row.field.size()) * row.field.transpose();
   }
-  const Vec3 omega(pose[1], pose[2], pose[3]);
-  const Mat3 linear = std::exp(pose[0]) * Rotation(omega) * frame.start_rotation;
+  const Mat3 linear = std::exp(pose[0]) * PoseRotation(pose);
   const Vec3 arm = linear * local;
   if (derivatives != nullptr) {
     derivatives->pose.col(0) = arm;
-    derivatives->pose.middleCols<3>(1) = -CrossMatrix(arm) * LeftJacobian(omega);
+    derivatives->pose.middleCols<3>(1) = -CrossMatrix(arm);
     derivatives->pose.rightCols<3>().setIdentity();
     derivatives->linear = linear;
   }
-  return arm + Vec3(pose[4], pose[5], pose[6]);
+  return arm + Vec3(pose[5], pose[6], pose[7]);
 }
 
 Vec3 PlacedPoint(const ShapeFrame& frame, const ShapeRow& row, const ShapeParameters& parameters,

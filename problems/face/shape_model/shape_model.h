@@ -3,17 +3,17 @@
 // differ from it (Cootes et al. 1995; Blanz & Vetter 1999). The unknowns of a shape's estimate
 // place a point of the model at
 //
-//   x = s R (mean + modes w + field a - centre) + t,   R = exp(omega) start_rotation,
+//   x = s R (mean + modes w + field a - centre) + t
 //
-// with the pose (ln s, omega, t), the coefficients w of the modes and a of the smooth field.
+// with the pose (s, R, t), the coefficients w of the modes and a of the smooth field.
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <span>
 #include <string_view>
 #include <vector>
 
+#include "problems/face/shape_model/shape_pose.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/mesh/tri_mesh.h"
 
@@ -44,25 +44,31 @@ std::vector<Vec3> ShapeAt(const ShapeModel& model, const Eigen::VectorXd& coeffi
 // The position of a model point on a shape. points: one per point of the mean.
 Vec3 FindPosition(const ModelPoint& at, const TriMesh& mean, const std::vector<Vec3>& points);
 
-// The fixed part of the pose. It lies near the solution, so that omega and t are well conditioned.
+// The fixed part of the placement: the point of the model that t places. At its centre, a turn and
+// a shift are nearly independent.
 struct ShapeFrame {
-  Mat3 start_rotation = Mat3::Identity();
-  Vec3 centre = Vec3::Zero();  // the model's centre, mm
+  Vec3 centre = Vec3::Zero();  // mm
 };
 
 struct ShapeParameters {
-  std::array<double, 7> pose = {};  // ln s, omega (3, rad), t (3, mm)
-  Eigen::VectorXd coefficients;     // k, N(0,1)
-  Eigen::VectorXd field;            // 3m, N(0,1): x, y, z of centre 0, of centre 1 ...
+  ShapePose pose = kUprightPose;
+  Eigen::VectorXd coefficients;  // k, N(0,1)
+  Eigen::VectorXd field;         // 3m, N(0,1): x, y, z of centre 0, of centre 1 ...
 
+  // The unknowns: those of a step of the pose, then coefficients and field.
   Eigen::Index size() const { return 7 + coefficients.size() + field.size(); }
 };
+
+// step: size() unknowns.
+ShapeParameters MoveParameters(const ShapeParameters& from, const Eigen::VectorXd& step);
+// from + fraction (to - from); the pose turns that part of the way.
+ShapeParameters PartOfWay(const ShapeParameters& from, const ShapeParameters& to, double fraction);
 
 // The parameters of the mean shape under a similarity.
 ShapeParameters StartParameters(const ShapeFrame& frame, const Similarity& subject_from_model,
                                 Eigen::Index modes, Eigen::Index centres);
-// The frame in which omega starts at 0.
-ShapeFrame StartFrame(const ShapeModel& model, const Similarity& subject_from_model);
+// The centre of the mean's points.
+ShapeFrame CentredFrame(const ShapeModel& model);
 // subject_from_model at these parameters.
 Similarity MakeSimilarity(const ShapeFrame& frame, const ShapeParameters& parameters);
 
@@ -81,8 +87,8 @@ ShapeRow MeanRow(const ShapeModel& model, const Eigen::MatrixXd& field,
 
 // Derivatives of a placed point. The derivatives by w and a follow from `linear`.
 struct ShapeDerivatives {
-  Eigen::Matrix<double, 3, 7> pose;
-  Eigen::Matrix3d linear;  // by the unplaced point: s R
+  Eigen::Matrix<double, 3, 7> pose;  // by a step of the pose, at 0
+  Eigen::Matrix3d linear;            // by the unplaced point: s R
 };
 Vec3 PlacedPoint(const ShapeFrame& frame, const ShapeRow& row, std::span<const double> pose,
                  std::span<const double> coefficients, std::span<const double> field,

@@ -134,11 +134,7 @@ ShapeParameters DrawParameters(const ShapeParameters& parameters, const ShapePos
   }
   const Eigen::VectorXd spread = posterior.spread.llt().matrixL() * pull,
                         step = posterior.information.llt().solve(spread);
-  ShapeParameters drawn = parameters;
-  Eigen::Map<Eigen::Matrix<double, 7, 1>>(drawn.pose.data()) += step.head<7>();
-  drawn.coefficients += step.segment(7, drawn.coefficients.size());
-  drawn.field += step.tail(drawn.field.size());
-  return drawn;
+  return MoveParameters(parameters, step);
 }
 
 }  // namespace semblance::problems

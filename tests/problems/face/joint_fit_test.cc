@@ -43,10 +43,7 @@ struct ClosedForm {
     }
     const Eigen::LDLT<Eigen::MatrixXd> factor(covariance);
     const Eigen::VectorXd pull = c.weights.prior.Deviations(parameters).array().inverse().square();
-    Eigen::VectorXd start(size), residual(count);
-    start.setZero();
-    start.segment<3>(4) = Eigen::Map<const Vec3>(c.state.parameters.pose.data() + 4);
-    start.segment<3>(1) = Eigen::Map<const Vec3>(c.state.parameters.pose.data() + 1);
+    Eigen::VectorXd residual(count);
     for (int round = 0; round < 60; ++round) {
       Eigen::MatrixXd jacobian(count, size);
       for (Eigen::Index n = 0; n < std::ssize(seen); ++n) {
@@ -59,15 +56,13 @@ struct ClosedForm {
         }
       }
       Eigen::VectorXd at(size);
-      at << Eigen::Map<const Eigen::VectorXd>(parameters.pose.data(), 7), parameters.coefficients,
+      at << StepBetween(c.state.parameters.pose, parameters.pose), parameters.coefficients,
           parameters.field;
       Eigen::MatrixXd normal = jacobian.transpose() * factor.solve(jacobian);
       normal.diagonal() += pull;
       const Eigen::VectorXd step = normal.ldlt().solve(
-          jacobian.transpose() * factor.solve(residual) + pull.cwiseProduct(at - start));
-      Eigen::Map<Eigen::VectorXd>(parameters.pose.data(), 7) -= step.head(7);
-      parameters.coefficients -= step.segment(7, kModeCount);
-      parameters.field -= step.tail(3 * kCentreCount);
+          jacobian.transpose() * factor.solve(residual) + pull.cwiseProduct(at));
+      parameters = MoveParameters(parameters, -step);
     }
     const Eigen::VectorXd pulled = factor.solve(residual);
     for (std::size_t i = 0; i < c.model.rows.size(); ++i) {
@@ -82,11 +77,8 @@ struct ClosedForm {
 };
 
 double LargestDifference(const ShapeParameters& a, const ShapeParameters& b) {
-  double most = 0;
-  for (int k = 0; k < 7; ++k) {
-    most = std::max(most, std::abs(a.pose[k] - b.pose[k]));
-  }
-  return std::max({most, (a.coefficients - b.coefficients).cwiseAbs().maxCoeff(),
+  return std::max({StepBetween(a.pose, b.pose).cwiseAbs().maxCoeff(),
+                   (a.coefficients - b.coefficients).cwiseAbs().maxCoeff(),
                    (a.field - b.field).cwiseAbs().maxCoeff()});
 }
 

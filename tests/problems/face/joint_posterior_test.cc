@@ -43,38 +43,27 @@ Places SomePlaces() {
   return places;
 }
 
-// All unknowns of level 0 in one vector.
-Eigen::VectorXd Unknowns(const JointState& state) {
-  const ShapeParameters& p = state.parameters;
-  Eigen::VectorXd all(p.size() + 3 * std::ssize(state.residual[0].vertices));
-  all << Eigen::Map<const Eigen::VectorXd>(p.pose.data(), 7), p.coefficients, p.field,
-      Eigen::Map<const Eigen::VectorXd>(state.residual[0].vertices[0].data(),
-                                        3 * std::ssize(state.residual[0].vertices));
-  return all;
+Eigen::Index UnknownCount(const JointState& state) {
+  return state.parameters.size() + 3 * std::ssize(state.residual[0].vertices);
 }
 
-JointState WithUnknowns(JointState state, const Eigen::VectorXd& all) {
-  ShapeParameters& p = state.parameters;
-  Eigen::Map<Eigen::VectorXd>(p.pose.data(), 7) = all.head(7);
-  p.coefficients = all.segment(7, p.coefficients.size());
-  p.field = all.segment(7 + p.coefficients.size(), p.field.size());
-  Eigen::Map<Eigen::VectorXd>(state.residual[0].vertices[0].data(),
-                              3 * std::ssize(state.residual[0].vertices)) =
-      all.tail(all.size() - p.size());
+// The state after a step of all unknowns of level 0.
+JointState MoveState(JointState state, const Eigen::VectorXd& step) {
+  const Eigen::Index model = state.parameters.size();
+  state.parameters = MoveParameters(state.parameters, step.head(model));
+  Eigen::Map<Eigen::VectorXd>(state.residual[0].vertices[0].data(), step.size() - model) +=
+      step.tail(step.size() - model);
   return state;
 }
 
 // The derivatives of S(u,v) by all unknowns, by central differences.
 Eigen::MatrixXd PointJacobian(const JointCase& c, const Vec2& uv) {
   constexpr double kStep = 1e-5;
-  const Eigen::VectorXd at = Unknowns(c.state);
-  Eigen::MatrixXd jacobian(3, at.size());
-  for (Eigen::Index k = 0; k < at.size(); ++k) {
-    Eigen::VectorXd more = at, less = at;
-    more[k] += kStep;
-    less[k] -= kStep;
-    jacobian.col(k) = (WithUnknowns(c.state, more).Point(c.model, uv) -
-                       WithUnknowns(c.state, less).Point(c.model, uv)) /
+  Eigen::MatrixXd jacobian(3, UnknownCount(c.state));
+  for (Eigen::Index k = 0; k < jacobian.cols(); ++k) {
+    const Eigen::VectorXd step = kStep * Eigen::VectorXd::Unit(jacobian.cols(), k);
+    jacobian.col(k) = (MoveState(c.state, step).Point(c.model, uv) -
+                       MoveState(c.state, -step).Point(c.model, uv)) /
                       (2 * kStep);
   }
   return jacobian;
@@ -97,11 +86,31 @@ Eigen::MatrixXd PriorCovariance(const JointCase& c) {
 
 // The rows of the observations, by differences.
 Eigen::MatrixXd ObservedRows(const JointCase& c) {
-  Eigen::MatrixXd rows(3 * std::ssize(c.data.dowels), Unknowns(c.state).size());
+  Eigen::MatrixXd rows(3 * std::ssize(c.data.dowels), UnknownCount(c.state));
   for (Eigen::Index n = 0; n < std::ssize(c.data.dowels); ++n) {
     rows.middleRows<3>(3 * n) = c.data.dowels[n].whitening * PointJacobian(c, c.data.dowels[n].uv);
   }
   return rows;
+}
+
+// A case whose errors are shared, smooth and larger among people.
+JointCase CorrelatedCase() {
+  JointCase c = LinearCase(3);
+  c.weights.prior.population_sd = 1.7;
+  for (SurfaceObservation& dowel : c.data.dowels) {
+    dowel.shared_mm = Vec3(0.3, -0.2, 0.5);
+  }
+  Random random(8);
+  for (int k = 0; k < 5; ++k) {
+    const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
+    c.data.seeds.push_back({.uv = uv,
+                            .position = c.Point(uv) + Vec3(0, 0, 0.1),
+                            .whitening = Vec3(0, 0.3, 0.6).transpose(),
+                            .loss_width = 1e9,
+                            .weight = 0.25,
+                            .smooth_sd_mm = 2});
+  }
+  return c;
 }
 
 JointPosterior MakeCasePosterior(const JointCase& c) {
@@ -130,21 +139,7 @@ TEST(JointPosterior, EqualsTheConditionedCovarianceOfDenseMatrices) {
 
 // H^-1 M H^-1 by dense matrices, with errors that are shared, smooth or larger among people.
 TEST(JointPosterior, CountsSharedAndSmoothErrorsAsTheirCovarianceStates) {
-  JointCase c = LinearCase(3);
-  c.weights.prior.population_sd = 1.7;
-  for (SurfaceObservation& dowel : c.data.dowels) {
-    dowel.shared_mm = Vec3(0.3, -0.2, 0.5);
-  }
-  Random random(8);
-  for (int k = 0; k < 5; ++k) {
-    const Vec2 uv(random.Uniform(0, 1), random.Uniform(0, 1));
-    c.data.seeds.push_back({.uv = uv,
-                            .position = c.Point(uv) + Vec3(0, 0, 0.1),
-                            .whitening = Vec3(0, 0.3, 0.6).transpose(),
-                            .loss_width = 1e9,
-                            .weight = 0.25,
-                            .smooth_sd_mm = 2});
-  }
+  const JointCase c = CorrelatedCase();
   const Eigen::MatrixXd prior = PriorCovariance(c), dowels = ObservedRows(c);
   Eigen::MatrixXd seeds(5, dowels.cols()), smooth(5, 5);
   Eigen::VectorXd shift(dowels.rows());
@@ -180,6 +175,29 @@ TEST(JointPosterior, CountsSharedAndSmoothErrorsAsTheirCovarianceStates) {
   }
 }
 
+// Random faces spread as sigma states.
+TEST(JointPosterior, DrawsFacesThatSpreadAsSigmaStates) {
+  constexpr int kDraws = 3000;
+  const JointCase c = CorrelatedCase();
+  const Places places = SomePlaces();
+  const JointPosterior posterior = MakeCasePosterior(c);
+  const std::vector<double> sigma = posterior.DeviationsAlong(places.uv, places.directions);
+  std::vector<double> sums(sigma.size()), squares(sigma.size());
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const JointState drawn = posterior.Draw(draw);
+    for (std::size_t k = 0; k < sigma.size(); ++k) {
+      const Vec3 move = drawn.Point(c.model, places.uv[k]) - c.Point(places.uv[k]);
+      sums[k] += move.dot(places.directions[k]) / sigma[k];
+      squares[k] += std::pow(move.dot(places.directions[k]) / sigma[k], 2);
+    }
+  }
+  for (std::size_t k = 0; k < sigma.size(); ++k) {
+    EXPECT_NEAR(sums[k] / kDraws, 0, 4 / std::sqrt(kDraws));
+    EXPECT_NEAR(squares[k] / kDraws, 1, 4 * std::sqrt(2.0 / kDraws));
+  }
+  EXPECT_EQ(posterior.Draw(7).residual[0].vertices, posterior.Draw(7).residual[0].vertices);
+}
+
 // Faces drawn from the prior, observed with noise and fitted again, lie as far from the fit as
 // sigma states.
 TEST(JointPosterior, StatesTheErrorsOfFitsToDrawnFaces) {
@@ -196,7 +214,7 @@ TEST(JointPosterior, StatesTheErrorsOfFitsToDrawnFaces) {
   double squares = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
     JointCase drawn = c;
-    const JointState truth = WithUnknowns(c.state, Unknowns(c.state) + root * normals(root.rows()));
+    const JointState truth = MoveState(c.state, root * normals(root.rows()));
     for (SurfaceObservation& dowel : drawn.data.dowels) {
       const Mat3 whitening = dowel.whitening;
       dowel.position = truth.Point(c.model, dowel.uv) + whitening.inverse() * normals(3);

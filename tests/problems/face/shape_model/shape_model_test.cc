@@ -129,37 +129,48 @@ TEST(ShapeParameters, JacobianEqualsItsNumericTwin) {
   const ShapeModel model = Dome();
   const std::vector<int> centres = {0, 30, 60, 80};
   const Eigen::MatrixXd field = SmoothFieldFactor(model.mean.points, centres, {}, {});
-  const ShapeFrame frame = StartFrame(model, SomePlace());
+  const ShapeFrame frame = CentredFrame(model);
   ShapeParameters parameters = StartParameters(frame, SomePlace(), model.Modes(), 4);
   Random random(3);
-  const auto each = [&](auto&& body) {
-    for (double& x : parameters.pose) body(x);
-    for (double& x : parameters.coefficients) body(x);
-    for (double& x : parameters.field) body(x);
+  const auto any_step = [&](double size) -> Eigen::VectorXd {
+    return Eigen::VectorXd::NullaryExpr(parameters.size(),
+                                        [&] { return random.Uniform(-size, size); });
   };
-  each([&](double& x) { x += random.Uniform(-0.7, 0.7); });
+  parameters = MoveParameters(parameters, any_step(0.7));
   const ShapeRow row = PointRowAt(model, field, {12, {0.2, 0.3, 0.5}});
   const Vec3 direction = Vec3(1, -2, 3).normalized();
   ShapeDerivatives derivatives;
   PlacedPoint(frame, row, parameters, &derivatives);
   const Eigen::RowVectorXd exact = DerivativeAlong(direction, row, derivatives);
   ASSERT_EQ(exact.size(), parameters.size());
-  Eigen::Index column = 0;
-  each([&](double& x) {
+  for (Eigen::Index k = 0; k < exact.size(); ++k) {
     constexpr double kStep = 1e-5;
-    const double old = x;
-    x = old + kStep;
-    const double above = direction.dot(PlacedPoint(frame, row, parameters));
-    x = old - kStep;
-    const double below = direction.dot(PlacedPoint(frame, row, parameters));
-    x = old;
-    EXPECT_NEAR(exact[column++], (above - below) / (2 * kStep), 1e-6);
-  });
+    const auto at = [&](double by) {
+      const Eigen::VectorXd step = by * Eigen::VectorXd::Unit(parameters.size(), k);
+      return direction.dot(PlacedPoint(frame, row, MoveParameters(parameters, step)));
+    };
+    EXPECT_NEAR(exact[k], (at(kStep) - at(-kStep)) / (2 * kStep), 1e-6);
+  }
+}
+
+TEST(ShapeParameters, PartOfTheWayEndsAtBothEndsAndAddsUp) {
+  const ShapeModel model = Dome();
+  const ShapeFrame frame = CentredFrame(model);
+  const ShapeParameters from = StartParameters(frame, SomePlace(), model.Modes(), 2);
+  Eigen::VectorXd step = Eigen::VectorXd::LinSpaced(from.size(), -0.4, 0.9);
+  const ShapeParameters to = MoveParameters(from, step);
+  const auto apart = [](const ShapeParameters& a, const ShapeParameters& b) {
+    return StepBetween(a.pose, b.pose).norm() + (a.coefficients - b.coefficients).norm() +
+           (a.field - b.field).norm();
+  };
+  EXPECT_LT(apart(PartOfWay(from, to, 0), from), 1e-12);
+  EXPECT_LT(apart(PartOfWay(from, to, 1), to), 1e-12);
+  EXPECT_LT(apart(PartOfWay(PartOfWay(from, to, 0.5), to, 0.5), PartOfWay(from, to, 0.75)), 1e-12);
 }
 
 TEST(ShapeParameters, PlacedPointsAreTheShapeUnderTheSimilarity) {
   const ShapeModel model = Dome();
-  const ShapeFrame frame = StartFrame(model, SomePlace());
+  const ShapeFrame frame = CentredFrame(model);
   ShapeParameters parameters = StartParameters(frame, SomePlace(), model.Modes(), 0);
   parameters.coefficients << 1, -0.5, 0.3, 2;
   const Eigen::MatrixXd no_field(std::ssize(model.mean.points), 0);
@@ -273,7 +284,7 @@ struct SeenDome {
   ShapeModel model = Dome();
   Eigen::MatrixXd field =
       SmoothFieldFactor(model.mean.points, std::vector<int>{0, 20, 40, 60, 80}, {}, {});
-  ShapeFrame frame = StartFrame(model, {});
+  ShapeFrame frame = CentredFrame(model);
   ShapeParameters parameters = StartParameters(frame, {}, model.Modes(), 5);
 
   std::vector<double> Sigma(const std::vector<int>& seen_vertices, double population_sd = 1) const {
