@@ -96,7 +96,7 @@ class JointStep {
   const ShapeParameters& parameters() const { return parameters_; }
 
  private:
-  // What finer levels add to R is taken off the positions.
+  // Takes what finer levels add to R off the positions.
   void Observe(const std::vector<SurfaceObservation>& seen) {
     for (const SurfaceObservation& one : seen) {
       const Stencil stencil = StencilAt(model_.shape, level_, one.uv);

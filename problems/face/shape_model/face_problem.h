@@ -43,7 +43,7 @@ class FaceProblem {
   FaceProblem(const ShapeFrame& frame, ShapeParameters& parameters, std::span<Vec3> vertices = {});
   ~FaceProblem();
 
-  // What is added next belongs to this part.
+  // Begins a part: the residuals that are added next belong to it.
   void BeginPart(std::string_view name);
 
   // The observation of the model's point at seen.row, moved by the sum of vertices.
