@@ -3,8 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <filesystem>
+#include <iterator>
 #include <optional>
 #include <span>
 #include <string>
@@ -24,6 +26,9 @@
 #include "surfaces/base/error.h"
 #include "surfaces/hspline/feature.h"
 #include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/mesh/fuse_meshes.h"
+#include "surfaces/mesh/mesh_check.h"
+#include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance::problems {
 namespace {
@@ -36,6 +41,7 @@ struct FaceArguments {
   std::vector<std::string> features;
   std::vector<double> weights;
   std::optional<double> chord_mm;
+  double blend_mm = 0;
   std::array<double, 2> u = {0, 1}, v = {0, 1};
   std::array<int, 2> levels = {1, 8};
   ModesPrior prior;
@@ -182,6 +188,29 @@ int MirrorCommand(const FaceArguments& a) {
   return Store(feature, a, FeatureFiles(a));
 }
 
+int FuseCommand(const FaceArguments& a) {
+  const std::array<fs::path, 2> given = {a.face, a.features.at(0)};
+  CheckFree(a.out, a, given);
+  std::vector<std::string> notes;
+  const TriMesh body = ReadMeshInLps(given[0], notes);
+  const TriMesh feature = ReadMeshInLps(given[1], notes);
+  std::ranges::copy(CheckHeadMesh(body, a.face), std::back_inserter(notes));
+  const FusedMesh fused = [&] {
+    try {
+      return FuseMeshes(body, feature, {.blend_mm = a.blend_mm});
+    } catch (const InputError& error) {
+      throw InputError(fmt::format("{} and {}: {}", a.face, a.features[0], error.what()));
+    }
+  }();
+  WriteFileAtomically(a.out, EncodeMesh(fused.mesh, fs::path(a.out).extension().string()));
+  for (const std::string& note : notes) {
+    Tell(stderr, "note: {}\n", note);
+  }
+  Tell("{}: {} triangles; seam {:.1f} mm, {:.0f} mm2 covered, {:.0f} mm2 added\n", a.out,
+       fused.mesh.triangles.size(), fused.seam_mm, fused.covered_mm2, fused.added_mm2);
+  return kDone;
+}
+
 int ListCommand(const FaceArguments& a) {
   for (const auto& [name, feature] : ReadFeatureLibrary(a.library)) {
     Tell("{}: {} vertices, {} x {} patches\n", name, feature.offsets.size(),
@@ -317,6 +346,23 @@ void DeclareMirror(CLI::App& mirror, CommandLine& line) {
   AddStore(mirror, a);
 }
 
+void DeclareFuse(CLI::App& fuse, CommandLine& line) {
+  FaceArguments& a = *Bind(fuse, line, &FuseCommand);
+  fuse.add_option("BODY", a.face,
+                  "mesh to add to, such as a run's implicit.ply (.ply .obj .off .stl)")
+      ->required();
+  fuse.add_option("FEATURE", a.features,
+                  "mesh of the feature at its place, in mm; its border, if any, inside the body")
+      ->required()
+      ->expected(1);
+  fuse.add_option("--out", a.out, "file for the fused mesh (.ply .obj .off .stl)")->required();
+  fuse.add_option("--blend_mm", a.blend_mm,
+                  "smooth the points within this distance of the seam [0: keep the crease]")
+      ->check(Finite())
+      ->check(CLI::NonNegativeNumber);
+  AddForce(fuse, a);
+}
+
 void DeclareList(CLI::App& list, CommandLine& line) {
   FaceArguments& a = *Bind(list, line, &ListCommand);
   list.add_option("LIBRARY", a.library, "folder")->required();
@@ -369,6 +415,8 @@ constexpr std::array kFeatureCommands = {
     ProgramCommand{"apply", "apply features to a face", &DeclareApply},
     ProgramCommand{"blend", "make a weighted sum of features", &DeclareBlend},
     ProgramCommand{"mirror", "make a feature for the other side", &DeclareMirror},
+    ProgramCommand{"fuse", "fuse a modelled or scanned feature with a mesh (thesis 3.4)",
+                   &DeclareFuse},
     ProgramCommand{"list", "list the features of a library", &DeclareList},
 };
 

@@ -15,6 +15,7 @@
 #include "surfaces/mesh_files/mesh_io.h"
 #include "surfaces/mesh_files/read_ply.h"
 #include "tests/testing/program_call.h"
+#include "tests/testing/shapes.h"
 #include "tests/testing/splines.h"
 
 namespace semblance::problems {
@@ -225,6 +226,28 @@ TEST_F(FaceCommands, FeatureRefusesWhatItCannotDo) {
   ExpectRefused("feature apply other.json lib/a.json --out x.json", "same template");
   EXPECT_FALSE(fs::exists(folder_ / "x.json"));
   EXPECT_EQ(Call("feature").code, 2);
+}
+
+TEST_F(FaceCommands, FuseJoinsAFeatureToAMesh) {
+  const auto write = [&](const char* name, const TriMesh& mesh) {
+    WriteFileAtomically(folder_ / name, EncodeMesh(mesh, fs::path(name).extension().string()));
+  };
+  const TriMesh head = testing::SphereMesh({0, 0, 0}, 80, 20);
+  const TriMesh nose = testing::SphereMesh({0, -80, 0}, 15, 12);
+  write("head.ply", head);
+  write("nose.stl", nose);
+  write("far.obj", testing::SphereMesh({0, -180, 0}, 15, 12));
+  ExpectDone("feature fuse head.ply nose.stl --out fused.ply");
+  const TriMesh fused = ReadMesh(folder_ / "fused.ply");
+  EXPECT_TRUE(BorderEdges(fused).empty());
+  EXPECT_NEAR(Bounds(fused).min().y(), Bounds(nose).min().y(), 1e-4);
+  EXPECT_GT(SignedVolume(fused), SignedVolume(head) + SignedVolume(nose) / 3);
+  ExpectDone("feature fuse head.ply nose.stl --out smooth.ply --blend_mm 5");
+  EXPECT_NE(Bytes("smooth.ply"), Bytes("fused.ply"));
+  ExpectRefused("feature fuse head.ply far.obj --out x.ply", "far.obj: the feature does not meet");
+  ExpectRefused("feature fuse head.ply nose.stl --out fused.ply", "--force");
+  ExpectRefused("feature fuse head.ply nose.stl --out nose.stl --force", "nose.stl");
+  ExpectRefused("feature fuse head.ply nose.stl --out x.txt", ".txt");
 }
 
 }  // namespace
