@@ -9,7 +9,7 @@ PROGRAM      := $(BUILD)/problems/semblance
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build demo demo-phantom deb site thesis test harness bench profile same-bytes clang-numbers sanitize races coverage \
+.PHONY: all setup configure build demo demo-phantom deb site thesis heads test harness bench profile same-bytes clang-numbers sanitize races coverage \
   format check headers tidy configs clean
 
 all: build
@@ -73,6 +73,15 @@ thesis: PRESET = quick
 thesis: configure
 	@cmake --build --preset quick --target semblance
 	@/usr/bin/python3 -B docs/thesis/make.py build-quick/problems/semblance out/thesis $(addprefix --only ,$(ONLY))
+
+# Every head of the folder HEADS that has a true skin, recovered with measured depths and with those of tables: one table, pictures, and the
+# table of docs/experiments/real-heads.md. ONLY="54 people.*" makes some.
+HEADS        ?= ../shared/data
+heads: PACKAGES = $(RUN_PACKAGES) python3
+heads: PRESET = quick
+heads: configure
+	@cmake --build --preset quick --target semblance
+	@/usr/bin/python3 -B docs/heads.py build-quick/problems/semblance $(HEADS) out/heads $(if $(ONLY),--only "$(ONLY)",--page docs/experiments/real-heads.md)
 
 test: build
 	@ctest --preset $(PRESET) -j "$$(nproc)"
