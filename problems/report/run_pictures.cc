@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/report/run_pictures.h"
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
@@ -46,7 +47,6 @@ struct Album {
   OutputFolder& folder;
   int threads;
   std::vector<Camera> cameras = CamerasFor(kViews, Region(result), kPictureAspect);
-  ShadowMaps of_skull = {}, of_face = {}, of_skin = {};
 };
 
 // Writes the scene from all sides. Returns its picture from the front.
@@ -56,10 +56,6 @@ Image WriteSheet(const char* name, const Scene& scene, Lighting lighting, Shadow
       RenderAll(scene, album.cameras, PictureOptions(lighting), shadows, album.threads);
   album.folder.Write(name, EncodePng(ContactSheet(sides)));
   return std::move(sides.front());
-}
-
-Scene SkullScene(const RunResult& result) {
-  return {{SkullObject(result.subject.skull), DowelObject(result.subject.dowels_on_bone)}};
 }
 
 // Writes the head framed by itself. Returns it from the front in the frame of the other pictures.
@@ -91,72 +87,88 @@ Colour StatusColour(SkinStatus status) {
   return HexColour(0xc8c0b8);
 }
 
-// Green: scored, yellow: masked, red: inner, blue: a lid, grey: the rest.
-void WriteScoredSkin(Album& album) {
-  const ScoredSkin& skin = album.result.truth->skin;
-  SceneObject object = SkinObject(*album.result.subject.skin);
-  for (const SkinStatus status : skin.status) {
-    object.vertex_colours.push_back(StatusColour(status));
+// Writes the mesh of the object from all sides, a sheet per colouring. Returns the first one from
+// the front.
+Image WriteColourings(std::span<const char* const> names, const SceneObject& object,
+                      std::span<const std::vector<Colour>> colourings, Lighting lighting,
+                      ShadowMaps& shadows, Album& album) {
+  std::vector<std::vector<Image>> sheets = RenderColourings(
+      {{object}}, colourings, album.cameras, PictureOptions(lighting), shadows, album.threads);
+  for (std::size_t k = 0; k < sheets.size(); ++k) {
+    album.folder.Write(names[k], EncodePng(ContactSheet(sheets[k])));
   }
-  WriteSheet("pictures/scored.png", {{object}}, Lighting::kStudio, album.of_skin, album);
+  return std::move(sheets.front().front());
 }
 
-void WriteError(const char* name, std::span<const double> signed_mm, Album& album) {
-  WriteSheet(name, {{MappedObject(*album.result.subject.skin, signed_mm, ErrorColours())}},
-             Lighting::kEven, album.of_skin, album);
+// Green: scored, yellow: masked, red: inner, blue: a lid, grey: the rest.
+std::vector<Colour> StatusColours(const ScoredSkin& skin) {
+  std::vector<Colour> colours(skin.status.size());
+  std::ranges::transform(skin.status, colours.begin(), StatusColour);
+  return colours;
 }
 
 // Returns the true skin from the front.
 Image WriteTruth(Album& album) {
-  Image skin = WriteSheet("pictures/truth.png", {{SkinObject(*album.result.subject.skin)}},
-                          Lighting::kStudio, album.of_skin, album);
-  WriteScoredSkin(album);
-  WriteError("pictures/error.png", album.result.truth->face.signed_mm, album);
-  WriteError("pictures/error_implicit.png", album.result.truth->implicit.signed_mm, album);
-  return skin;
+  const TriMesh& skin = *album.result.subject.skin;
+  const TruthComparison& truth = *album.result.truth;
+  ShadowMaps shadows;
+  Image front =
+      WriteColourings({{"pictures/truth.png", "pictures/scored.png"}}, SkinObject(skin),
+                      {{{}, StatusColours(truth.skin)}}, Lighting::kStudio, shadows, album);
+  const std::vector<double>& of_face = truth.face.signed_mm;
+  WriteColourings(
+      {{"pictures/error.png", "pictures/error_implicit.png"}},
+      MappedObject(skin, of_face, ErrorColours()),
+      {{ColoursAt(ErrorColours(), of_face), ColoursAt(ErrorColours(), truth.implicit.signed_mm)}},
+      Lighting::kEven, shadows, album);
+  return front;
 }
 
-SceneObject ByOrigin(SceneObject object, const RunResult& result, int threads) {
-  for (const BoneOrigin origin : OriginUnder(object.mesh, result.shell, result.origin, threads)) {
-    object.vertex_colours.push_back(OriginColour(origin));
+std::vector<Colour> ColoursByOrigin(const TriMesh& mesh, const Album& album) {
+  std::vector<Colour> colours;
+  for (const BoneOrigin origin :
+       OriginUnder(mesh, album.result.shell, album.result.origin, album.threads)) {
+    colours.push_back(OriginColour(origin));
   }
-  return object;
+  return colours;
 }
 
-// Writes the shell, and the face over it, by the origin of the bone. Skipped if all bone is
-// observed.
-void WriteOrigin(Album& album) {
-  const RunResult& result = album.result;
+// Returns whether some bone is not observed.
+bool HasOrigins(const RunResult& result) {
   const auto [observed, mirrored, inferred] = AreaByOrigin_cm2(result.shell, result.origin);
-  if (mirrored + inferred == 0) {
-    return;
-  }
-  ShadowMaps of_shell;
-  WriteSheet("pictures/origin.png", {{ByOrigin(SkullObject(result.shell), result, album.threads)}},
-             Lighting::kStudio, of_shell, album);
-  WriteSheet("pictures/origin_face.png",
-             {{ByOrigin(SkinObject(result.face.mesh), result, album.threads)}}, Lighting::kStudio,
-             album.of_face, album);
+  return mirrored + inferred > 0;
 }
 
-void WriteDepth(Album& album) {
-  ShadowMaps of_shell;
+// Writes the shell by its depth and, unless all bone is observed, by the origin of the bone.
+void WriteShell(Album& album) {
+  const RunResult& result = album.result;
+  ShadowMaps shadows;
   WriteSheet("pictures/depth.png",
-             {{MappedObject(album.result.shell, album.result.depth.depth_mm, DepthColours())}},
-             Lighting::kEven, of_shell, album);
+             {{MappedObject(result.shell, result.depth.depth_mm, DepthColours())}}, Lighting::kEven,
+             shadows, album);
+  if (HasOrigins(result)) {
+    SceneObject shell = SkullObject(result.shell);
+    shell.vertex_colours = ColoursByOrigin(shell.mesh, album);
+    WriteSheet("pictures/origin.png", {{std::move(shell)}}, Lighting::kStudio, shadows, album);
+  }
 }
 
 // Returns the implicit surface from the front.
 Image WriteImplicit(Album& album) {
-  ShadowMaps of_implicit;
+  ShadowMaps shadows;
   return WriteSheet("pictures/implicit.png", {{SkinObject(album.result.implicit.dense)}},
-                    Lighting::kStudio, of_implicit, album);
+                    Lighting::kStudio, shadows, album);
 }
 
-void WriteFaceOverSkull(Album& album) {
-  Scene over = SkullScene(album.result);
-  over.objects.push_back(SkinObject(album.result.face.mesh, 0.55));
-  WriteSheet("pictures/face_over_skull.png", over, Lighting::kStudio, album.of_skull, album);
+// Writes skull and dowels, then the face over them. Returns the first from the front.
+Image WriteSkull(Album& album) {
+  Scene scene{
+      {SkullObject(album.result.subject.skull), DowelObject(album.result.subject.dowels_on_bone)}};
+  ShadowMaps shadows;
+  Image front = WriteSheet("pictures/skull_dowels.png", scene, Lighting::kStudio, shadows, album);
+  scene.objects.push_back(SkinObject(album.result.face.mesh, 0.55));
+  WriteSheet("pictures/face_over_skull.png", scene, Lighting::kStudio, shadows, album);
+  return front;
 }
 
 // The way on the face from one (u,v) to another, a little above it. u may lead over the seam.
@@ -224,14 +236,24 @@ void WriteFit(Album& album) {
   WriteSheet("pictures/fit.png", scene, Lighting::kStudio, shadows, album);
 }
 
-void WriteSigma(Album& album) {
-  const auto& uncertainty = album.result.uncertainty;
-  if (!uncertainty || uncertainty->sigma_mm.empty()) {
-    return;
+// Writes the face, by the origin of the bone below it and by its sigma. Returns it from the front.
+Image WriteFace(Album& album) {
+  const RunResult& result = album.result;
+  const SceneObject face = SkinObject(result.face.mesh);
+  std::vector<std::vector<Colour>> colourings = {{}};
+  if (HasOrigins(result)) {
+    colourings.push_back(ColoursByOrigin(face.mesh, album));
   }
-  WriteSheet("pictures/sigma.png",
-             {{MappedObject(album.result.face.mesh, uncertainty->sigma_mm, SigmaColours())}},
-             Lighting::kEven, album.of_face, album);
+  ShadowMaps shadows;
+  Image front = WriteColourings({{"pictures/face.png", "pictures/origin_face.png"}}, face,
+                                colourings, Lighting::kStudio, shadows, album);
+  const auto& uncertainty = result.uncertainty;
+  if (uncertainty && !uncertainty->sigma_mm.empty()) {
+    WriteSheet("pictures/sigma.png",
+               {{MappedObject(face.mesh, uncertainty->sigma_mm, SigmaColours())}}, Lighting::kEven,
+               shadows, album);
+  }
+  return front;
 }
 
 }  // namespace
@@ -287,19 +309,14 @@ std::vector<double> SignedErrors(const TriMesh& mesh, const RunResult& result,
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context) {
   context.Report("pictures");
   Album album{.result = result, .folder = folder, .threads = context.threads};
-  std::vector<Image> overview = {WriteSheet("pictures/skull_dowels.png", SkullScene(result),
-                                            Lighting::kStudio, album.of_skull, album)};
-  WriteDepth(album);
+  std::vector<Image> overview = {WriteSkull(album)};
+  WriteShell(album);
   overview.push_back(WriteImplicit(album));
-  overview.push_back(WriteSheet("pictures/face.png", {{SkinObject(result.face.mesh)}},
-                                Lighting::kStudio, album.of_face, album));
+  overview.push_back(WriteFace(album));
   if (result.bust) {
     overview.push_back(WriteBust(album));
   }
-  WriteOrigin(album);
-  WriteFaceOverSkull(album);
   WriteFit(album);
-  WriteSigma(album);
   if (result.truth) {
     overview.push_back(WriteTruth(album));
   }

@@ -5,9 +5,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <span>
+#include <unordered_map>
 #include <utility>
 
 #include "surfaces/base/error.h"
@@ -68,6 +68,17 @@ void ForEachEdge(const TriMesh& mesh, const Visit& visit) {
 }
 
 using FacedCell = std::array<std::int64_t, 4>;  // the cell of the grid, and the side that is faced
+
+struct CellHash {
+  std::size_t operator()(const FacedCell& cell) const {
+    std::uint64_t hash = 0;
+    for (const std::int64_t index : cell) {
+      hash = (hash ^ static_cast<std::uint64_t>(index)) * 0x9E3779B97F4A7C15ULL;
+      hash ^= hash >> 32;
+    }
+    return hash;
+  }
+};
 
 std::int64_t FacedSide(const Vec3& normal) {
   Eigen::Index axis = 0;
@@ -254,7 +265,8 @@ TriMesh ClusterVertices(const TriMesh& mesh, double cell_mm) {
     throw InputError(fmt::format("cluster vertices: cell_mm is {}; it must be positive", cell_mm));
   }
   const std::vector<Vec3> normals = VertexNormals(mesh);
-  std::map<FacedCell, std::int32_t> clusters;  // numbered in the order of their first vertices
+  // Numbered in the order of their first vertices.
+  std::unordered_map<FacedCell, std::int32_t, CellHash> clusters;
   std::vector<std::int32_t> cluster_of(mesh.points.size());
   TriMesh coarse;
   std::vector<double> members;

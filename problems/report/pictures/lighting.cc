@@ -9,6 +9,7 @@
 
 #include "problems/report/pictures/raster.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/mesh/mesh_primitives.h"
 
 namespace semblance::problems {
 namespace {
@@ -84,46 +85,48 @@ Mat3 ViewTowards(const Vec3& to_viewer) {
   return view;
 }
 
-ShadowMap RenderShadowMap(const FlatScene& flat, const std::vector<bool>& casts,
-                          const ShadowMaps& all, const Vec3& to_light) {
-  const double diameter = std::max(all.box.diagonal().norm(), 1e-9);
+ShadowMap RenderShadowMap(const ShadowMaps& all, const Vec3& to_light) {
   const int size = all.texels;
   ShadowMap map{.projection = {.view_from_world = ViewTowards(to_light),
                                .centre = all.box.center(),
-                               .samples_per_mm = (size - 4) / diameter,
+                               .samples_per_mm = 1 / all.Texel_mm(),
                                .width = static_cast<double>(size),
                                .height = static_cast<double>(size)},
                 .texels = size,
                 .depth = std::vector<float>(static_cast<std::size_t>(size) * size,
                                             std::numeric_limits<float>::infinity())};
-  std::vector<RasterPoint> points(flat.vertices.size());
-  for (std::size_t v = 0; v < points.size(); ++v) {
-    if (casts[flat.object_of_vertex[v]]) {
-      points[v] = map.projection * flat.vertices[v].position;
-    }
-  }
-  for (const SceneTriangle& t : flat.triangles) {
-    if (casts[t.object]) {
-      VisitSamples(points[t.corners[0]], points[t.corners[1]], points[t.corners[2]],
-                   {0, size, 0, size}, [&](const Coverage& s) {
-                     float& depth = map.depth[static_cast<std::size_t>(s.y) * size + s.x];
-                     depth = std::min(depth, s.depth);
-                   });
-    }
+  std::vector<RasterPoint> points(all.casters.points.size());
+  std::ranges::transform(all.casters.points, points.begin(),
+                         [&](const Vec3& p) { return map.projection * p; });
+  for (const auto& [a, b, c] : all.casters.triangles) {
+    VisitSamples(points[a], points[b], points[c], {0, size, 0, size}, [&](const Coverage& s) {
+      float& depth = map.depth[static_cast<std::size_t>(s.y) * size + s.x];
+      depth = std::min(depth, s.depth);
+    });
   }
   return map;
 }
 
-// The share of each colour that passes `thickness_mm` of matter: half at scatter_mm, falling with
-// the square of the thickness. A smooth stand-in for scattering below the skin.
-Rgb TransmittedShare(float thickness_mm, const Rgb& scatter_mm) {
-  const Rgb ratio = thickness_mm / scatter_mm;
-  return 1 / (1 + ratio * ratio);
-}
+// What the light of a material's vertices depends on.
+struct Matter {
+  float wrap;
+  Eigen::Array4f per_mm2;  // 1 / scatter_mm^2 of red, green and blue
+
+  explicit Matter(const Material& material)
+      : wrap(static_cast<float>(material.wrap)), per_mm2(Eigen::Array4f::Zero()) {
+    per_mm2.head<3>() = material.scatter_mm.cast<float>().array().square().inverse();
+  }
+
+  // The share of each colour that passes `thickness_mm`: half at scatter_mm, falling with the
+  // square of the thickness. A smooth stand-in for scattering below the skin.
+  Eigen::Array4f Transmitted(float thickness_mm) const {
+    return 1 / (1 + thickness_mm * thickness_mm * per_mm2);
+  }
+};
 
 // The share of light that arrives, interpolated between the four texels around the point: 1 in the
 // open, towards 0 behind matter.
-Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
+Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Matter& matter) {
   const RasterPoint at = map.projection * p;
   const float texel_mm = static_cast<float>(1 / map.projection.samples_per_mm);
   const std::int32_t half = kSubsamples / 2;
@@ -133,40 +136,39 @@ Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Rgb& scatter_mm) {
   }
   const float fx = static_cast<float>((at.x - half) & 255) / kSubsamples;
   const float fy = static_cast<float>((at.y - half) & 255) / kSubsamples;
-  Rgb sum = Rgb::Zero();
+  Eigen::Array4f sum = Eigen::Array4f::Zero();
   for (int k = 0; k < 4; ++k) {
     const int dx = k & 1, dy = k >> 1;
     const float weight = (dx != 0 ? fx : 1 - fx) * (dy != 0 ? fy : 1 - fy);
     const float thickness = at.depth - map.depth[(y + dy) * map.texels + x + dx] - texel_mm;
-    sum += thickness > 0 ? Rgb(weight * TransmittedShare(thickness, scatter_mm))
-                         : Rgb::Constant(weight);
+    sum += weight * (thickness > 0 ? matter.Transmitted(thickness) : Eigen::Array4f::Ones());
   }
-  return sum;
+  return sum.head<3>();
 }
 
 // The share of one light that reaches the vertex, times its wrapped cosine.
-Rgb ShareOfLight(const Material& material, const SceneVertex& vertex, const Vec3& to_light,
+Rgb ShareOfLight(const Matter& matter, const SceneVertex& vertex, const Vec3& to_light,
                  const ShadowMap& map, Rgb& through) {
-  const auto wrap = static_cast<float>(material.wrap);
-  const float wrapped = (static_cast<float>(vertex.normal.dot(to_light)) + wrap) / (1 + wrap);
+  const float wrapped =
+      (static_cast<float>(vertex.normal.dot(to_light)) + matter.wrap) / (1 + matter.wrap);
   if (wrapped <= 0) {
     return Rgb::Zero();
   }
   // Starts 1.5 texels above the surface, so that the surface does not shade itself.
   const Vec3 above = vertex.position + 1.5 / map.projection.samples_per_mm * vertex.normal;
-  through = LightThrough(map, above, material.scatter_mm.cast<float>().array());
+  through = LightThrough(map, above, matter);
   return wrapped * through;
 }
 
 using MapList = std::vector<const ShadowMap*>;
 
-SkyShare FindSkyShare(const Material& material, std::span<const Vec3> sky, const MapList& maps,
+SkyShare FindSkyShare(const Matter& matter, std::span<const Vec3> sky, const MapList& maps,
                       const SceneVertex& vertex) {
   SkyShare share{.sum = Rgb::Zero()};
   for (std::size_t light = 0; light < sky.size(); ++light) {
     const Vec3& direction = sky[light];
     Rgb through;
-    const Rgb part = ShareOfLight(material, vertex, direction, *maps[light], through);
+    const Rgb part = ShareOfLight(matter, vertex, direction, *maps[light], through);
     share.sum += part;
     for (int axis = 0; axis < 3; ++axis) {
       share.along[axis] += static_cast<float>(direction[axis]) * part;
@@ -175,7 +177,7 @@ SkyShare FindSkyShare(const Material& material, std::span<const Vec3> sky, const
   return share;
 }
 
-void LightVertex(const Material& material, const LightRig& rig, const MapList& maps,
+void LightVertex(const Matter& matter, const LightRig& rig, const MapList& maps,
                  const SkyShare& sky, SceneVertex& vertex) {
   vertex.light = rig.sky_level * sky.sum;
   for (int axis = 0; axis < 3; ++axis) {
@@ -187,7 +189,7 @@ void LightVertex(const Material& material, const LightRig& rig, const MapList& m
     const Light& light = rig.lights[i];
     Rgb through = Rgb::Constant(-1);  // stays: the surface faces away
     vertex.light +=
-        ShareOfLight(material, vertex, light.to_light, *maps[i], through) * light.irradiance;
+        ShareOfLight(matter, vertex, light.to_light, *maps[i], through) * light.irradiance;
     if (light.is_key && through[1] >= 0) {
       key_all += 1;
       key_seen += through[1];
@@ -197,14 +199,33 @@ void LightVertex(const Material& material, const LightRig& rig, const MapList& m
 }
 
 // The box of the vertices that cast shadows, or the origin if there are none.
-Box3 BoundCasters(const FlatScene& flat, const std::vector<bool>& casts) {
+Box3 BoundCasters(const Scene& scene) {
   Box3 box;
-  for (std::size_t v = 0; v < flat.vertices.size(); ++v) {
-    if (casts[flat.object_of_vertex[v]]) {
-      box.extend(flat.vertices[v].position);
+  for (const SceneObject& object : scene.objects) {
+    if (object.opacity >= 1) {
+      box.extend(Bounds(object.mesh));
     }
   }
   return box.isEmpty() ? Box3(Vec3::Zero(), Vec3::Zero()) : box;
+}
+
+// The opaque surfaces as they are drawn into shadow maps: with one vertex per cell of kCellTexels
+// texels, about as far as a point lies above its surface before it looks for shadows. On a skull of
+// 394 thousand triangles 120 thousand remain. A colour of the picture changes by 0.1 of 255 steps
+// on average, by 10 steps in one of a thousand, and by twice as much with twice the cell. A surface
+// that would lose much of its area, as a small marker would, stays as it is.
+TriMesh MakeCasters(const Scene& scene, double texel_mm) {
+  constexpr double kCellTexels = 3;
+  constexpr double kLeastArea = 0.6;  // the skulls and skins of two scans keep all of theirs
+  TriMesh all;
+  for (const SceneObject& object : scene.objects) {
+    if (object.opacity < 1) {
+      continue;
+    }
+    const TriMesh thin = ClusterVertices(object.mesh, kCellTexels * texel_mm);
+    Append(all, Area(thin) < kLeastArea * Area(object.mesh) ? object.mesh : thin);
+  }
+  return all;
 }
 
 }  // namespace
@@ -246,8 +267,7 @@ LightRig MakeLightRig(Lighting lighting, const Mat3& view_from_world) {
 namespace {
 
 // The maps of the lights in these directions. Renders those that are missing.
-MapList FindMaps(std::span<const Vec3> to_light, const FlatScene& flat,
-                 const std::vector<bool>& casts, int threads, ShadowMaps& maps) {
+MapList FindMaps(std::span<const Vec3> to_light, int threads, ShadowMaps& maps) {
   MapList found;
   std::vector<std::pair<Vec3, ShadowMap*>> missing;
   for (const Vec3& d : to_light) {
@@ -257,9 +277,8 @@ MapList FindMaps(std::span<const Vec3> to_light, const FlatScene& flat,
       missing.emplace_back(d, &map->second);
     }
   }
-  ParallelFor(missing.size(), threads, 1, [&](std::size_t i) {
-    *missing[i].second = RenderShadowMap(flat, casts, maps, missing[i].first);
-  });
+  ParallelFor(missing.size(), threads, 1,
+              [&](std::size_t i) { *missing[i].second = RenderShadowMap(maps, missing[i].first); });
   return found;
 }
 
@@ -267,30 +286,32 @@ MapList FindMaps(std::span<const Vec3> to_light, const FlatScene& flat,
 
 void LightVertices(const Scene& scene, const LightRig& rig, int threads, ShadowMaps& maps,
                    FlatScene& flat) {
-  std::vector<bool> casts;
-  for (const SceneObject& object : scene.objects) {
-    casts.push_back(object.opacity >= 1);
-  }
-  const Box3 box = BoundCasters(flat, casts);
-  if (!maps.of_direction.empty() && (maps.box.min() != box.min() || maps.box.max() != box.max())) {
+  const Box3 box = BoundCasters(scene);
+  if (maps.of_direction.empty()) {
+    maps.box = box;
+    maps.casters = MakeCasters(scene, maps.Texel_mm());
+  } else if (maps.box.min() != box.min() || maps.box.max() != box.max()) {
     throw std::logic_error("shadows of a scene with other meshes");
   }
-  maps.box = box;
+  std::vector<Matter> matter;
+  for (const SceneObject& object : scene.objects) {
+    matter.emplace_back(object.material);
+  }
   const std::array<Vec3, kSkyLights> sky = SkyDirections();
   std::vector<Vec3> moving(rig.lights.size());
   std::ranges::transform(rig.lights, moving.begin(), &Light::to_light);
-  const MapList of_sky = FindMaps(sky, flat, casts, threads, maps);
-  const MapList of_lights = FindMaps(moving, flat, casts, threads, maps);
+  const MapList of_sky = FindMaps(sky, threads, maps);
+  const MapList of_lights = FindMaps(moving, threads, maps);
   flat.sky.resize(flat.vertices.size());
   ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {
     if (!flat.is_seen.empty() && !flat.is_seen[v]) {
       return;
     }
-    const Material& material = scene.objects[flat.object_of_vertex[v]].material;
+    const Matter& of_vertex = matter[flat.object_of_vertex[v]];
     if (std::isnan(flat.sky[v].sum[0])) {
-      flat.sky[v] = FindSkyShare(material, sky, of_sky, flat.vertices[v]);
+      flat.sky[v] = FindSkyShare(of_vertex, sky, of_sky, flat.vertices[v]);
     }
-    LightVertex(material, rig, of_lights, flat.sky[v], flat.vertices[v]);
+    LightVertex(of_vertex, rig, of_lights, flat.sky[v], flat.vertices[v]);
   });
 }
 

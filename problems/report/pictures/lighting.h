@@ -3,6 +3,7 @@
 // has a depth map of the surfaces nearest to it, which gives soft shadows.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <map>
@@ -87,6 +88,9 @@ struct ShadowMaps {
   int texels = 320;
   std::map<std::array<double, 3>, ShadowMap> of_direction;  // to the light
   Box3 box;                                                 // of the opaque vertices
+  TriMesh casters;  // the opaque meshes, those that are fine thinned to a few texels
+
+  double Texel_mm() const { return std::max(box.diagonal().norm(), 1e-9) / (texels - 4); }
 };
 
 // Sets light and key of every vertex that is seen, and its share of the sky if that is missing.

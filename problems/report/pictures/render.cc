@@ -25,17 +25,22 @@ Rgb LinearColour(const Colour& c) {
           static_cast<float>(LinearFromSrgb(c.b))};
 }
 
-void CheckObject(const SceneObject& object, std::size_t index) {
-  const std::size_t points = object.mesh.points.size(), colours = object.vertex_colours.size();
-  if (!(object.opacity >= 0 && object.opacity <= 1)) {
-    throw InputError(
-        fmt::format("scene object {}: opacity {} must be between 0 and 1", index, object.opacity));
-  }
+void CheckColours(const SceneObject& object, std::size_t colours, std::size_t index) {
+  const std::size_t points = object.mesh.points.size();
   if (colours != 0 && colours != points) {
     throw InputError(
         fmt::format("scene object {}: {} vertex colours for {} points; give one per point or none",
                     index, colours, points));
   }
+}
+
+void CheckObject(const SceneObject& object, std::size_t index) {
+  const std::size_t points = object.mesh.points.size();
+  if (!(object.opacity >= 0 && object.opacity <= 1)) {
+    throw InputError(
+        fmt::format("scene object {}: opacity {} must be between 0 and 1", index, object.opacity));
+  }
+  CheckColours(object, object.vertex_colours.size(), index);
   for (std::size_t i = 0; i < points; ++i) {
     if (!object.mesh.points[i].allFinite()) {
       throw InputError(fmt::format("scene object {}: point {} is not finite", index, i));
@@ -67,6 +72,13 @@ void CheckOptions(const Camera& camera, const RenderOptions& o) {
   }
 }
 
+// Per vertex of the object. colours: one per vertex, or none for the material's.
+std::vector<Rgb> LinearColours(const SceneObject& object, std::span<const Colour> colours) {
+  std::vector<Rgb> linear(object.mesh.points.size(), LinearColour(object.material.colour));
+  std::ranges::transform(colours, linear.begin(), LinearColour);
+  return linear;
+}
+
 FlatScene Flatten(const Scene& scene) {
   FlatScene flat;
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
@@ -74,12 +86,10 @@ FlatScene Flatten(const Scene& scene) {
     CheckObject(object, i);
     const auto base = static_cast<std::int32_t>(flat.vertices.size());
     const std::vector<Vec3> normals = VertexNormals(object.mesh);
+    const std::vector<Rgb> albedo = LinearColours(object, object.vertex_colours);
     for (std::size_t v = 0; v < normals.size(); ++v) {
-      const Colour& colour =
-          object.vertex_colours.empty() ? object.material.colour : object.vertex_colours[v];
-      flat.vertices.push_back({.position = object.mesh.points[v],
-                               .normal = normals[v],
-                               .albedo = LinearColour(colour)});
+      flat.vertices.push_back(
+          {.position = object.mesh.points[v], .normal = normals[v], .albedo = albedo[v]});
     }
     for (const Triangle& t : object.mesh.triangles) {
       flat.triangles.push_back({{base + t[0], base + t[1], base + t[2]}, static_cast<int>(i)});
@@ -134,6 +144,7 @@ class Painter {
         flat_(flat),
         has_sheer_(std::ranges::any_of(scene.objects,
                                        [](const SceneObject& o) { return o.opacity < 1; })) {
+    CheckOptions(camera, options);
     const int s = options.supersampling;
     projection_ = {.view_from_world = camera.view_from_world,
                    .centre = camera.centre,
@@ -145,14 +156,21 @@ class Painter {
     ParallelFor(points_.size(), threads, 4096,
                 [&](std::size_t v) { points_[v] = projection_ * flat_.vertices[v].position; });
     FillBands();
-    layers_.resize(Bands());
-    ParallelFor(Bands(), threads, 1, [&](std::size_t band) { layers_[band] = FindNearest(band); });
+    layers_.resize(triangles_of_band_.size());
+    ParallelFor(layers_.size(), threads, 1,
+                [&](std::size_t band) { layers_[band] = FindNearest(band); });
     MarkSeen();
     LightVertices(scene, rig_, threads, shadows, flat_);
   }
 
-  std::size_t Bands() const { return triangles_of_band_.size(); }
+  // Uses the present colours of the vertices.
+  Image Paint(int threads) const {
+    Image image = MakeImage(options_.width, options_.height, Colour{});
+    ParallelFor(layers_.size(), threads, 1, [&](std::size_t band) { PaintBand(band, image); });
+    return image;
+  }
 
+ private:
   void PaintBand(std::size_t band, Image& image) const {
     const int s = options_.supersampling, first = FirstRow(band), end = EndRow(band);
     for (int row = first / s; row < end / s; ++row) {
@@ -163,7 +181,6 @@ class Painter {
     }
   }
 
- private:
   // The rows of samples in a band.
   int FirstRow(std::size_t band) const {
     return static_cast<int>(band) * kBandRows * options_.supersampling;
@@ -240,52 +257,55 @@ class Painter {
     half_way_ = (half_way_.normalized() + to_viewer_).normalized();
   }
 
-  // The triangle that fills all samples of a pixel with no translucent surface in front, or -1.
-  std::int32_t OnlyTriangle(const Layers& seen, int first_row, int column, int row) const {
-    const int s = options_.supersampling, columns = s * options_.width;
-    const std::size_t first = static_cast<std::size_t>(s * row - first_row) * columns + s * column;
-    const std::int32_t triangle = seen.opaque.triangle[first];
-    for (int k = 0; k < s * s; ++k) {
-      const std::size_t i = first + static_cast<std::size_t>(k / s) * columns + k % s;
-      if (seen.opaque.triangle[i] != triangle || (has_sheer_ && seen.sheer.triangle[i] >= 0)) {
-        return -1;
-      }
-    }
-    return triangle;
+  // The triangles that a sample shows; -1: none.
+  struct Shown {
+    std::int32_t opaque = -1, sheer = -1;
+    bool operator==(const Shown&) const = default;
+  };
+
+  Shown ShownAt(const Layers& seen, std::size_t sample) const {
+    const auto& [opaque, sheer] = seen;
+    const bool in_front = has_sheer_ && sheer.depth[sample] < opaque.depth[sample];
+    return {opaque.triangle[sample], in_front ? sheer.triangle[sample] : -1};
   }
 
-  // The mean over the samples of a pixel. A pixel within one triangle is shaded once, at its
-  // middle.
+  // The mean over the samples of a pixel. Samples that show the same triangles are shaded once, at
+  // their middle: in a fine mesh the four samples of a pixel seldom show four triangles.
   Rgb PixelLight(const Layers& seen, int first_row, int column, int row,
                  const Rgb& background) const {
-    const int s = options_.supersampling;
-    if (const std::int32_t only = OnlyTriangle(seen, first_row, column, row); only >= 0) {
-      return Shade(only, (2 * column + 1) * s * kHalfSample, (2 * row + 1) * s * kHalfSample)
-          .colour;
-    }
-    return AverageSamples(seen, first_row, column, row, background);
-  }
-
-  Rgb AverageSamples(const Layers& seen, int first_row, int column, int row,
-                     const Rgb& background) const {
-    const auto& [opaque, sheer] = seen;
     const int s = options_.supersampling, columns = s * options_.width;
+    const std::size_t first = static_cast<std::size_t>(s * row - first_row) * columns + s * column;
+    const auto shown_at = [&](int k) {
+      return ShownAt(seen, first + static_cast<std::size_t>(k / s) * columns + k % s);
+    };
     Rgb sum = Rgb::Zero();
+    std::uint64_t done = 0;  // one bit per sample
     for (int k = 0; k < s * s; ++k) {
-      const int x = s * column + k % s, y = s * row + k / s;
-      const std::int64_t middle_x = (2 * x + 1) * kHalfSample, middle_y = (2 * y + 1) * kHalfSample;
-      const std::size_t i = static_cast<std::size_t>(y - first_row) * columns + x;
-      Rgb colour = background;
-      if (opaque.triangle[i] >= 0) {
-        colour = Shade(opaque.triangle[i], middle_x, middle_y).colour;
+      const Shown shown = shown_at(k);
+      std::int64_t count = 0, x = 0, y = 0;
+      for (int other = k; other < s * s; ++other) {
+        if ((done >> other & 1) == 0 && (other == k || shown_at(other) == shown)) {
+          done |= std::uint64_t{1} << other;
+          ++count;
+          x += (2 * (s * column + other % s) + 1) * kHalfSample;
+          y += (2 * (s * row + other / s) + 1) * kHalfSample;
+        }
       }
-      if (has_sheer_ && sheer.triangle[i] >= 0 && sheer.depth[i] < opaque.depth[i]) {
-        const Shaded sheet = Shade(sheer.triangle[i], middle_x, middle_y);
-        colour = sheet.alpha * sheet.colour + (1 - sheet.alpha) * colour;
+      if (count > 0) {
+        sum += static_cast<float>(count) * Mix(shown, x / count, y / count, background);
       }
-      sum += colour;
     }
     return sum / static_cast<float>(s * s);
+  }
+
+  // The colour at the place (x, y), in steps.
+  Rgb Mix(const Shown& shown, std::int64_t x, std::int64_t y, const Rgb& background) const {
+    const Rgb behind = shown.opaque < 0 ? background : Shade(shown.opaque, x, y).colour;
+    if (shown.sheer < 0) {
+      return behind;
+    }
+    const Shaded sheet = Shade(shown.sheer, x, y);
+    return sheet.alpha * sheet.colour + (1 - sheet.alpha) * behind;
   }
 
   Rgb Background(int row) const {
@@ -432,11 +452,31 @@ std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras
   std::vector<Image> images;
   FlatScene flat = Flatten(scene);
   for (const Camera& camera : cameras) {
-    CheckOptions(camera, options);
+    images.push_back(Painter(scene, camera, options, shadows, threads, flat).Paint(threads));
+  }
+  return images;
+}
+
+std::vector<std::vector<Image>> RenderColourings(const Scene& scene,
+                                                 std::span<const std::vector<Colour>> colourings,
+                                                 std::span<const Camera> cameras,
+                                                 const RenderOptions& options, ShadowMaps& shadows,
+                                                 int threads) {
+  FlatScene flat = Flatten(scene);
+  std::vector<std::vector<Rgb>> albedos;
+  for (const std::vector<Colour>& colours : colourings) {
+    CheckColours(scene.objects.at(0), colours.size(), 0);
+    albedos.push_back(LinearColours(scene.objects[0], colours));
+  }
+  std::vector<std::vector<Image>> images(colourings.size());
+  for (const Camera& camera : cameras) {
     const Painter painter(scene, camera, options, shadows, threads, flat);
-    Image& image = images.emplace_back(MakeImage(options.width, options.height, Colour{}));
-    ParallelFor(painter.Bands(), threads, 1,
-                [&](std::size_t band) { painter.PaintBand(band, image); });
+    for (std::size_t k = 0; k < albedos.size(); ++k) {
+      for (std::size_t v = 0; v < albedos[k].size(); ++v) {
+        flat.vertices[v].albedo = albedos[k][v];
+      }
+      images[k].push_back(painter.Paint(threads));
+    }
   }
   return images;
 }

@@ -100,5 +100,13 @@ Image Render(const Scene& scene, const Camera& camera, const RenderOptions& opti
 // Later calls with the same opaque meshes reuse them through `shadows` (lighting.h).
 std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
                              const RenderOptions& options, ShadowMaps& shadows, int threads);
+// Renders the scene once per colouring and camera: result[colouring][camera]. A colouring gives the
+// vertex colours of the first object in place of its own, or none for its material's. Light and
+// hidden surfaces, which take most of the time, are computed once for all colourings.
+std::vector<std::vector<Image>> RenderColourings(const Scene& scene,
+                                                 std::span<const std::vector<Colour>> colourings,
+                                                 std::span<const Camera> cameras,
+                                                 const RenderOptions& options, ShadowMaps& shadows,
+                                                 int threads);
 
 }  // namespace semblance::problems

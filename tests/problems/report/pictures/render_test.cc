@@ -4,6 +4,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
@@ -112,6 +114,55 @@ TEST(Render, FewVerticesNeedFewTexels) {
     sum += std::abs(few.rgb[k] - many.rgb[k]);
   }
   EXPECT_LT(sum / static_cast<double>(few.rgb.size()), 1);
+}
+
+TEST(Render, ColouringsAgreeWithScenesOfTheseColours) {
+  Scene scene = Crowd();
+  std::vector<Colour> reds(scene.objects[0].mesh.points.size());
+  for (std::size_t v = 0; v < reds.size(); ++v) {
+    reds[v] = {static_cast<double>(v) / static_cast<double>(reds.size()), 0, 0};
+  }
+  const std::vector<std::vector<Colour>> colourings = {reds, {}};
+  const std::array cameras = {FrontCamera(90), FrontCamera(50)};
+  const RenderOptions options{.width = 90, .height = 80};
+  ShadowMaps shadows;
+  const std::vector<std::vector<Image>> images =
+      RenderColourings(scene, colourings, cameras, options, shadows, 2);
+  ASSERT_EQ(images.size(), 2u);
+  for (std::size_t k = 0; k < images.size(); ++k) {
+    scene.objects[0].vertex_colours = colourings[k];
+    for (std::size_t n = 0; n < cameras.size(); ++n) {
+      EXPECT_EQ(images[k].at(n).rgb, Render(scene, cameras[n], options, 1).rgb) << k << " " << n;
+    }
+  }
+  EXPECT_NE(images[0][0].rgb, images[1][0].rgb);
+}
+
+TEST(Render, AColouringHasOneColourPerVertexOrNone) {
+  const std::vector<std::vector<Colour>> colourings = {std::vector<Colour>(3)};
+  const Camera camera = FrontCamera(60);
+  ShadowMaps shadows;
+  EXPECT_THROW(
+      RenderColourings({{Square(10, 0, kBlack)}}, colourings, {&camera, 1}, Plain(), shadows, 1),
+      InputError);
+}
+
+// Shadows are cast by a thinned mesh, whose picture differs little from that of the fine one.
+TEST(Render, FineMeshesAreThinnedToCastShadowsAndMarkersAreNot) {
+  const SceneObject head = SkullObject(MakeSphere(Vec3::Zero(), 40, 160)),
+                    marker = SkullObject(MakeSphere(Vec3(-26, -26, 26), 0.3, 12));
+  const Camera camera = FrontCamera(90);
+  ShadowMaps shadows;
+  RenderAll({{head, marker}}, {&camera, 1}, Plain(Lighting::kStudio), shadows, 1);
+  const auto beyond = [](const TriMesh& mesh) {
+    return std::ranges::count_if(mesh.triangles, [&mesh](const Triangle& t) {
+      return TriangleCentroid(mesh, t).norm() > 41;
+    });
+  };
+  EXPECT_LT(shadows.casters.triangles.size(), head.mesh.triangles.size() / 3);
+  EXPECT_EQ(beyond(shadows.casters), beyond(marker.mesh));
+  EXPECT_GT(beyond(marker.mesh), 50);
+  EXPECT_NEAR(Area(shadows.casters) / Area(head.mesh), 1, 0.02);
 }
 
 TEST(Render, SharedShadowsOfOtherMeshesAreRefused) {
