@@ -17,6 +17,7 @@
 #include "problems/report/view/view_mesh.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
+#include "surfaces/hspline_query/tessellate.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {
@@ -25,6 +26,11 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr int kHeadTriangles = 50000;  // more than kViewTriangles, for ears and lids
+
+// Bounds the distance of the view's face from the surface; a smaller chord makes a larger page. On
+// configs/demo.yaml the 29,794 triangles are 0.03 mm (RMS) and at most 0.16 mm from the surface. A
+// decimated mesh of 24,000 was 0.01 and 0.09 mm from it, but took a sixth of the view's time.
+constexpr double kFaceChord_mm = 0.25;
 
 Json MapJson(const ColourMap& map, const char* title) {
   return {{"title", title},
@@ -46,13 +52,14 @@ struct ViewMeshes {
 
 ViewMeshes MakeViewMeshes(const RunResult& result, int threads) {
   ViewMeshes view;
-  const std::array<std::pair<const TriMesh*, TriMesh*>, 6> jobs = {
+  view.face = SimplifyForView(TessellateToChord(result.fit.surface, kFaceChord_mm, threads).mesh,
+                              kHeadTriangles);
+  const std::array<std::pair<const TriMesh*, TriMesh*>, 5> jobs = {
       {{&result.subject.skull, &view.skull},
        {result.subject.skin ? &*result.subject.skin : nullptr, &view.skin},
        {&result.shell, &view.shell},
        {&result.implicit.mesh, &view.implicit},
-       {result.bust ? &result.bust->skin : nullptr, &view.bust},
-       {&result.face.mesh, &view.face}}};
+       {result.bust ? &result.bust->skin : nullptr, &view.bust}}};
   ParallelFor(jobs.size(), threads, 1, [&jobs, &view](std::size_t k) {
     if (jobs[k].first != nullptr) {
       const bool head = jobs[k].second == &view.bust;

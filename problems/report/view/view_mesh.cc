@@ -52,7 +52,7 @@ TriMesh SimplifyForView(const TriMesh& mesh, int most_triangles) {
   // them need not be measured.
   constexpr int kRough = 6;
   try {
-    const bool is_large = static_cast<int>(mesh.triangles.size()) / 2 > kRough * most_triangles;
+    const bool is_large = static_cast<int>(mesh.triangles.size()) > kRough * most_triangles;
     const TriMesh rough = is_large ? Decimate(mesh, {.target_triangles = kRough * most_triangles,
                                                      .check = DecimateCheck::kNone})
                                          .mesh

@@ -4,12 +4,17 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
+#include "problems/experiment/experiment_config.h"
 #include "problems/report/view/view_mesh.h"
+#include "problems/run.h"
 #include "surfaces/base/error.h"
+#include "surfaces/hspline_query/tessellate.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "tests/testing/scratch_file.h"
 #include "tests/testing/shapes.h"
 
@@ -85,6 +90,27 @@ TEST(SceneBlobs, EqualGeometryIsStoredOnce) {
   const TriMesh mesh = {{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}};
   EXPECT_EQ(blobs.AddMesh(mesh), blobs.AddMesh(mesh));
   EXPECT_EQ(blobs.All().size(), 1u);
+}
+
+TEST(SceneJson, TheFaceLiesOnTheSurface) {
+  const std::vector<std::string> overrides = {"subject.rings=40", "implicit.resolution=30",
+                                              "rounds=1", "template.max_level=1",
+                                              "fit.plan.schedule=[{level: 0, fraction: 1}]"};
+  const RunResult run = problems::Run(
+      ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides), {});
+  const Json scene = Json::parse(SceneJson(run, {}));
+  const auto layer =
+      std::ranges::find_if(scene["layers"], [](const Json& of) { return of["id"] == "face"; });
+  ASSERT_NE(layer, scene["layers"].end());
+  const TriMesh shown = DecodeMeshBlob(scene["blobs"][(*layer)["mesh"].get<std::string>()]);
+  const TriMesh fine = Tessellate(run.fit.surface, 64).mesh;
+  const MeshQuery of_shown(shown), of_fine(fine);
+  for (const Vec3& p : shown.points) {
+    EXPECT_LT(of_fine.Closest(p).distance_mm, 0.02);
+  }
+  for (const Vec3& p : fine.points) {
+    EXPECT_LT(of_shown.Closest(p).distance_mm, 0.26);
+  }
 }
 
 std::string Scene(const std::string& blob, std::size_t size) {
