@@ -20,6 +20,7 @@
 
 #include "problems/app/evaluate.h"
 #include "problems/app/exit_code.h"
+#include "problems/app/keep_memory.h"
 #include "problems/app/program_end.h"
 #include "problems/app/work_options.h"
 #include "problems/config/terminal_text.h"
@@ -105,6 +106,7 @@ void RequireSoundAlternatives(const std::filesystem::path& config, const Experim
 }
 
 int RunCommand(const Arguments& arguments) {
+  KeepFreedMemory();
   const std::filesystem::path config = arguments.files.at(0);
   const auto experiment = ReadConfig<Experiment>(config, arguments.overrides);
   CheckNetworkNamed(experiment, config);

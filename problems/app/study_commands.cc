@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "problems/app/exit_code.h"
+#include "problems/app/keep_memory.h"
 #include "problems/app/live_study.h"
 #include "problems/app/shard.h"
 #include "problems/app/workbench/http_server.h"
@@ -224,6 +225,7 @@ void EndLivePage(LiveStudy& live) {
 }
 
 int StudyCommand(const StudyArguments& a) {
+  KeepFreedMemory();
   const bool plan_only = a.list || (a.files.size() == 2 && a.files[0] == "plan");
   if (a.files.size() == 2 && !plan_only) {
     throw InputError(
