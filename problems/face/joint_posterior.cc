@@ -66,8 +66,8 @@ Eigen::VectorXd DrawNormals(Eigen::Index count, Random& random) {
   return Eigen::VectorXd::NullaryExpr(count, [&random] { return random.Normal(); });
 }
 
-// H, lower triangle. One product of all rows takes half the time of a sum of the parts' products,
-// whose large dense blocks would be added one after the other.
+// H, lower triangle, as one product of all rows. In a sum of the parts' products the additions took
+// longer than the products, because each part fills the same large dense block.
 SparseMatrix MakeInformation(const JointRows& rows) {
   const std::array parts = {&rows.dowels, &rows.seeds, &rows.marks, &rows.residual_field,
                             &rows.face_model};

@@ -29,7 +29,7 @@ constexpr int kHeadTriangles = 50000;  // more than kViewTriangles, for ears and
 
 // Bounds the distance of the view's face from the surface; a smaller chord makes a larger page. On
 // configs/demo.yaml the 29,794 triangles are 0.03 mm (RMS) and at most 0.16 mm from the surface. A
-// decimated mesh of 24,000 was 0.01 and 0.09 mm from it, but took a sixth of the view's time.
+// decimated mesh of 24,000 was 0.01 and 0.09 mm from it, but decimation takes far longer.
 constexpr double kFaceChord_mm = 0.25;
 
 Json MapJson(const ColourMap& map, const char* title) {
