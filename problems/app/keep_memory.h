@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How the program holds its memory.
+// The policy of the program for memory that a step has freed: it is kept.
 #pragma once
 
 #include <cstdlib>

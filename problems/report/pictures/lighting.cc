@@ -107,7 +107,7 @@ ShadowMap RenderShadowMap(const ShadowMaps& all, const Vec3& to_light) {
   return map;
 }
 
-// What the light of a material's vertices depends on.
+// The properties of a material on which the light at its vertices depends.
 struct Matter {
   float wrap;
   Eigen::Array4f per_mm2;  // 1 / scatter_mm^2 of red, green and blue
