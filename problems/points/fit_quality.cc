@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+#include "problems/points/fit_quality.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+
+#include "fitting/plan/fit_check.h"
+#include "surfaces/base/quantile.h"
+
+namespace semblance::problems {
+namespace {
+
+bool LieOnLine(std::span<const Vec3> positions) {
+  constexpr double kNarrow = 1e-4;  // share of the mean squares across the line
+  Vec3 mean = Vec3::Zero();
+  for (const Vec3& p : positions) {
+    mean += p / static_cast<double>(positions.size());
+  }
+  Mat3 moments = Mat3::Zero();
+  for (const Vec3& p : positions) {
+    moments += (p - mean) * (p - mean).transpose();
+  }
+  const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>(moments).eigenvalues();
+  return squares[1] < kNarrow * squares[2];
+}
+
+// The noise of a point of mean weight over its given sigma. The weights are 1 / sigma^2; the mean
+// is over the points that are no outliers.
+double SigmaFactor(const AutoReport& report, std::span<const double> weights) {
+  double sum = 0;
+  auto next = report.outliers.begin();
+  for (std::uint32_t k = 0; k < weights.size(); ++k) {
+    if (next != report.outliers.end() && *next == k) {
+      ++next;
+    } else {
+      sum += weights[k];
+    }
+  }
+  return report.noise_mm *
+         std::sqrt(sum / static_cast<double>(weights.size() - report.outliers.size()));
+}
+
+double RootMeanSquare(std::span<const double> distances) {
+  double sum = 0;
+  for (const double distance : distances) {
+    sum += distance * distance;
+  }
+  return std::sqrt(sum / static_cast<double>(distances.size()));
+}
+
+// Returns how far the surface goes beyond the box, in units of `size`. It looks at a grid of
+// places; more of them would only refine a figure that is compared with 3.
+double ReachBeyond(const HSplineSurface& surface, const Box3& box, double size) {
+  constexpr int kCells = 64;  // along u and v
+  double farthest = 0;
+  for (int i = 0; i <= kCells; ++i) {
+    for (int j = 0; j <= kCells; ++j) {
+      const Vec3 at = surface.Point(Vec2(i, j) / kCells);
+      farthest = std::max(farthest, box.exteriorDistance(at));
+    }
+  }
+  return farthest / size;
+}
+
+bool IsOutlier(const FitResult& fit, std::uint32_t k) {
+  return fit.automatic && std::ranges::binary_search(fit.automatic->outliers, k);
+}
+
+// The distances of the points that are no outliers.
+std::vector<double> CountedDistances(const FitResult& fit) {
+  std::vector<double> distances_mm;
+  distances_mm.reserve(fit.residual_mm.size());
+  for (std::uint32_t k = 0; k < fit.residual_mm.size(); ++k) {
+    if (!IsOutlier(fit, k)) {
+      distances_mm.push_back(fit.residual_mm[k]);
+    }
+  }
+  return distances_mm;
+}
+
+// The same as RootMeanSquare(CountedDistances(fit)), with weights.
+double WeightedRms(const FitResult& fit, std::span<const double> weights) {
+  double sum = 0, all = 0;
+  for (std::uint32_t k = 0; k < weights.size(); ++k) {
+    if (!IsOutlier(fit, k)) {
+      sum += weights[k] * fit.residual_mm[k] * fit.residual_mm[k];
+      all += weights[k];
+    }
+  }
+  return std::sqrt(sum / all);
+}
+
+}  // namespace
+
+GivenPoints KeepFacts(const PointTable& table, ParameterSource source,
+                      std::span<const ExactPoint> exact) {
+  GivenPoints given{.weights = table.weights,
+                    .exact_uv = {},
+                    .box = {},
+                    .has_uv = source == ParameterSource::kGiven,
+                    .has_sigma = table.weights_of_sigma};
+  for (const Vec3& p : table.positions) {
+    given.box.extend(p);
+  }
+  given.on_line = LieOnLine(table.positions);
+  std::ranges::transform(exact, std::back_inserter(given.exact_uv), &ExactPoint::uv);
+  return given;
+}
+
+void CompareShapes(const GivenPoints& given, PointFit& result) {
+  const double diagonal = given.box.diagonal().norm();
+  result.reach = ReachBeyond(result.fit.surface, given.box, diagonal);
+  result.off = given.has_uv && given.on_line
+                   ? kNaN
+                   : RootMeanSquare(CountedDistances(result.fit)) / diagonal;
+}
+
+void CompareDistances(const GivenPoints& given, PointFit& result) {
+  const std::optional<AutoReport>& report = result.fit.automatic;
+  const std::span<const double> weights = given.weights;
+  result.sigma_factor = given.has_sigma && report ? SigmaFactor(*report, weights) : kNaN;
+  result.distance = ComputeQuantiles(result.fit);
+  if (std::ranges::any_of(weights, [&](double weight) { return weight != weights[0]; })) {
+    result.weighted_rms_mm = WeightedRms(result.fit, weights);
+  }
+  result.fit.point_rms_mm = RootMeanSquare(CountedDistances(result.fit));
+  result.rms_of_all_mm = RootMeanSquare(result.fit.residual_mm);
+}
+
+std::string TailText(const FitResult& fit, std::string_view unit) {
+  constexpr double kLongTail = 3;  // RMS over median; 1.5 for normal errors, 2 for Laplace's
+  if (!fit.automatic || fit.automatic->met_to_rounding) {
+    return "";
+  }
+  std::vector<double> distances = CountedDistances(fit);
+  if (distances.empty()) {
+    return "";
+  }
+  const double rms_mm = RootMeanSquare(distances), median_mm = UpperMedian(distances);
+  return rms_mm > kLongTail * median_mm
+             ? fmt::format(
+                   "the distances have a long tail: half of the points lie within {}, and the RMS "
+                   "is {}; many points may be gross errors that were not recognised, and the "
+                   "surface follows them; clean the points, and fit again",
+                   LengthText(median_mm, unit, 3), LengthText(rms_mm, unit, 3))
+             : "";
+}
+
+std::vector<std::string> PointFit::Faults() const {
+  // Both limits are far beyond good fits and short of what nobody would use: a surface that follows
+  // its points has a reach below 1, and points of one sheet lie within a few percent of it.
+  constexpr double kMostReach = 3, kMostOff = 0.1;
+  std::vector<std::string> faults = FaultsIn(fit);
+  if (faults.empty() && reach > kMostReach) {
+    faults.push_back(
+        fmt::format("the surface goes {:.3g} times the points' extent beyond them, where no point "
+                    "holds it; fit pieces that lie apart each by itself, or take coarser levels "
+                    "(fit.plan.finest), or, with plan: adaptive, a smoothness with more weight",
+                    reach));
+  }
+  if (faults.empty() && off > kMostOff) {
+    faults.push_back(
+        fmt::format("the points lie {} (RMS) from the surface, {:.3g} % of their extent, "
+                    "as points that fill space or lie on several sheets do; give (u,v), other "
+                    "parameters, one sheet alone, or finer levels if it is one",
+                    LengthText(fit.point_rms_mm, unit, 3), 100 * off));
+  }
+  return faults;
+}
+
+}  // namespace semblance::problems
