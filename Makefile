@@ -92,10 +92,12 @@ export SEED LAWS COUNT PAIRS SHARE MINUTES JOBS
 harness: build
 	@tests/harness/harness.sh $(PROGRAM) configs $(ONLY)
 
-# Our program against peers, measured in one run; build/bench.json holds the entries and the machine.
+# Our program against peers, measured in one run; build/bench.json holds the entries and the machine. POINTS: a folder of sets of points with
+# the heights that were kept back (fit_bench files).
 bench: build
 	@cmake --build build --target bench
 	@for program in build/tests/bench/*_bench; do echo "$$program" >&2; $$program; done | tee build/bench.lines >&2
+	@if [ -n "$(POINTS)" ]; then build/tests/bench/fit_bench files "$(POINTS)" | tee -a build/bench.lines >&2; fi
 	@{ echo '{"machine": "'"$$(grep -m1 'model name' /proc/cpuinfo | cut -d: -f2 | sed 's/^ //'), $$(nproc) cores"'",'; \
 	  echo '"entries": ['; grep '^{' build/bench.lines | sed '$$!s/$$/,/'; echo ']}'; } > build/bench.json; rm build/bench.lines
 	@echo build/bench.json

@@ -10,12 +10,17 @@
 #include "tests/bench/fit_parts.h"
 
 // One BLAS thread for every case; OpenBLAS looks at the variable only when it is loaded.
+// fit_bench files FOLDER: each NAME.csv.gz of a folder that has a NAME.truth.npz.
 // fit_bench [head] [command] [untuned] [peers] [feet] [heldout] [coverage] [relax] [linear]: parts;
 // none: all of them.
 int main(int argc, char** argv) {
   if (std::getenv("OPENBLAS_NUM_THREADS") == nullptr) {
     setenv("OPENBLAS_NUM_THREADS", "1", 1);
     execv("/proc/self/exe", argv);
+  }
+  if (argc == 3 && std::strcmp(argv[1], "files") == 0) {
+    semblance::bench::RunFiles(argv[2]);
+    return 0;
   }
   const auto wanted = [&](const char* part) {
     return argc == 1 || std::any_of(argv + 1, argv + argc,

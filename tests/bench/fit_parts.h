@@ -2,6 +2,8 @@
 // The parts of fit_bench; each prints its lines.
 #pragma once
 
+#include <string>
+
 #include "fitting/problem/fit_schedule.h"
 #include "tests/bench/fit_measure.h"
 
@@ -31,6 +33,11 @@ void RunHeldOut();
 
 // The share of a surface within the intervals of an adaptive fit that should hold 90 % of it.
 void RunCoverage();
+
+// Files of heights over x and y, with nothing chosen, against MBA at its best at places that were
+// kept back. A set is NAME.csv.gz with the points and NAME.truth.npz, whose array xyz has the places
+// and heights that were kept back.
+void RunFiles(const std::string& folder);
 
 // Points whose (u,v) are off, until the surface is where it should be.
 void RunRelaxation();
