@@ -80,6 +80,11 @@ constexpr double kBetterRatio = 1.001;
 // Smallest share of new vertices that is worth a round, and the same after a round that gained
 // nothing. Smaller shares cost rounds, larger ones lose detail.
 constexpr double kMinNewShare = 0.007, kMinNewShareAfterNoGain = 0.02;
+// Rounds without a better one that end the refinement, and the ratio of held-out errors at which
+// one is enough. On 60 sets of smooth and rough surfaces with independent and correlated errors no
+// later round was better; on soundings along tracks they took more than half of the time.
+constexpr int kMaxRoundsNoBetter = 2;
+constexpr double kClearlyWorse = 1.01;
 // Points per patch of the next level for overlaying all dense patches; with fewer, vertices have
 // too few points. Cheap fits may go further, since cross-validation smooths what is too fine.
 constexpr double kDense = 1.25, kCheapDense = 0.3;
@@ -254,7 +259,7 @@ class NestedFitter {
       context_.Report("fit",
                       fmt::format("{} vertices to level {}", space_.Vertices(), space_.finest()));
       FitRound();
-      if (IsMet() || IsRoundedBelow() || !Refine()) {
+      if (IsMet() || IsRoundedBelow() || IsPastBest() || !Refine()) {
         break;
       }
     }
@@ -615,6 +620,16 @@ class NestedFitter {
       }
     }
     return level;
+  }
+
+  // Returns whether refinement has met the held-out points better before and is not likely to do so
+  // again. Finer rounds are the dearest ones.
+  bool IsPastBest() const {
+    const std::vector<NestedRound>& rounds = report_.rounds;
+    const int since_best = static_cast<int>(rounds.size()) - 1 - best_->round;
+    const bool is_worse =
+        rounds.back().held_out_rms_mm > kClearlyWorse * rounds[best_->round].held_out_rms_mm;
+    return (since_best >= kMaxRoundsNoBetter || (since_best > 0 && is_worse)) && !HasFoundNothing();
   }
 
   bool HasComeNearer() const {

@@ -58,14 +58,16 @@ SEMBLANCE_INLINE void AddFar(const RunProduct& run, std::ptrdiff_t dj, std::ptrd
   }
 }
 
+// Goes along the run once, so that each block's entries are read from memory once.
 template <int channels>
 SEMBLANCE_INLINE void AddRun(const RunProduct& run) {
-  for (int block = 0; block < run.blocks; ++block) {
-    AddNear<channels>(run, static_cast<std::ptrdiff_t>(kBlock) * block);
-  }
-  for (std::ptrdiff_t dj = 0; dj <= 3; ++dj) {
-    for (int block = 0; block <= run.blocks; ++block) {
-      AddFar<channels>(run, dj, static_cast<std::ptrdiff_t>(kBlock) * block - (dj == 0 ? 0 : 3));
+  for (int block = 0; block <= run.blocks; ++block) {
+    const std::ptrdiff_t k = static_cast<std::ptrdiff_t>(kBlock) * block;
+    if (block < run.blocks) {
+      AddNear<channels>(run, k);
+    }
+    for (std::ptrdiff_t dj = 0; dj <= 3; ++dj) {
+      AddFar<channels>(run, dj, k - (dj == 0 ? 0 : 3));
     }
   }
 }
