@@ -36,6 +36,8 @@ class NestedSolve {
   // Adopts a linked space, which must outlive its use. The last solution stays as the start of the
   // next solve; its levels must be levels of the space.
   void Enter(const NestedSpace& space);
+  // Forgets the last solution, so that the next space need not have its levels.
+  void Forget() { solution_.clear(); }
   // Enters the space, and assembles the chosen points. An additional channel holds a random sign
   // per point, for the trace.
   void Begin(const NestedSpace& space, PointChoice used,

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <functional>
 #include <map>
+#include <optional>
 
 #include "fitting/nested/nested_solve.h"
 
@@ -25,6 +26,20 @@ struct NestedWeight {
 // Returns the middle weight if the minimum is not between the outer two.
 double WeightBetween(const NestedWeight& rougher, const NestedWeight& middle,
                      const NestedWeight& smoother);
+
+// Errors that neighbouring points share, on a surface that is smooth beyond them. Cross-validation
+// takes such errors for detail, because a point predicts its neighbours' errors: it is right only
+// if errors are independent (Opsomer, Wang & Yang 2001). But the residuals show them. As the weight
+// grows fourfold from that of cross-validation, residuals grow slowly while the surface lets go of
+// the errors, and at least 3.2 times (as mean squares) as soon as it leaves the surface behind
+// them, if that is smooth. Rough surfaces, edges and steps never show such a knee: their residuals
+// grow steadily, less than 2.9 times.
+struct SharedErrors {
+  double weight = kNaN;  // at the knee
+  // The errors' mean square per parameter that the surface has at the knee, mm^2 along one axis;
+  // for independent errors it is their variance.
+  double square_per_parameter = kNaN;
+};
 
 // Searches by the score of Craven & Wahba (1979) with the trace from one probe. Each solve starts
 // from the last solution and ends when the remaining gain is a given part of the noise's effect on
@@ -56,6 +71,9 @@ class NestedWeightSearch {
   // WeightBetween of the best weight and its two neighbours; the best weight if a neighbour is
   // missing.
   double Between() const;
+  // Looks for errors that neighbouring points share, beyond the weight `from`, as far as the mean
+  // squared residual stays below `most`, mm^2 (class comment of SharedErrors).
+  std::optional<SharedErrors> FindSharedErrors(double from, double most);
   // Solves with this weight, more accurately than for comparisons, and makes it the best.
   NestedWeight FinalSolve(double weight);
   // Takes the largest weight at which the misfit of the solve's present solution, a mean square, is
@@ -67,6 +85,7 @@ class NestedWeightSearch {
  private:
   NestedWeight Try(double weight);
   void Take(double weight);
+  double SquarePerParameter(const NestedWeight& rougher, const NestedWeight& smoother) const;
   bool IsBetter(const NestedWeight& next) const;
   template <class Search>
   bool TryMetric(const BendingMetric& metric, const Search& search);

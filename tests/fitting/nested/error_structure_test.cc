@@ -5,13 +5,18 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <vector>
 
+#include "fitting/least_squares/patch_energy.h"
 #include "fitting/nested/nested_fit.h"
 #include "fitting/problem/start_surface.h"
+#include "fitting/solve/surface_sigma.h"
 #include "surfaces/base/random.h"
+#include "tests/testing/point_sets.h"
 
 namespace semblance::fitting {
 namespace {
@@ -179,6 +184,94 @@ TEST(ErrorStructure, TheDesignEffectCountsSharedErrorsOfRuns) {
     effect.Add(k, {{of_run[k % kRuns] + random.Normal(), 0, 0}});
   }
   EXPECT_NEAR(effect.Value(), (kPerRun + 1) / 2.0, 4);
+}
+
+// A random field of variance 1 by Bochner's theorem: waves whose numbers have the spectrum of the
+// covariance exp(-h / length), or of exp(-h^2 / (2 length^2)).
+class CorrelatedErrors {
+ public:
+  CorrelatedErrors(double length, bool is_rough, std::uint64_t random_seed) {
+    Random random(random_seed);
+    for (Wave& wave : waves_) {
+      const double spread = is_rough ? std::abs(random.Normal()) : 1;
+      wave.number = Vec2(random.Normal(), random.Normal()) / (length * spread);
+      wave.phase = random.Uniform(0, 2 * std::numbers::pi);
+    }
+  }
+  double operator()(const Vec2& at) const {
+    double sum = 0;
+    for (const Wave& wave : waves_) {
+      sum += std::cos(wave.number.dot(at) + wave.phase);
+    }
+    return sum * std::sqrt(2.0 / static_cast<double>(waves_.size()));
+  }
+
+ private:
+  struct Wave {
+    Vec2 number;
+    double phase;
+  };
+  std::array<Wave, 500> waves_;
+};
+
+// The share of the true surface within 1.645 standard deviations, which should be 90 %.
+double CoverageOf(const NestedFitResult& fit, const Points& points) {
+  const AutoReport& report = fit.report;
+  const SurfaceSigma sigma(
+      fit.surface, {.uv = points.uv, .weights = {}, .columns = {}}, {},
+      {.noise_mm = report.noise_mm / std::sqrt(report.effective_share),
+       .weight = report.weight,
+       .stretch = report.stretch,
+       .direction_deg = report.direction_deg,
+       .lengths_mm = MeanLengths(StartSurface(kShape, points.positions, points.uv))});
+  constexpr int kAcross = 60;
+  std::vector<Vec2> places;
+  for (int k = 0; k < kAcross * kAcross; ++k) {
+    places.emplace_back((k % kAcross + 0.5) / kAcross, (k / kAcross + 0.5) / kAcross);
+  }
+  const std::vector<double> sd = sigma.At(places);
+  int within = 0;
+  for (std::size_t k = 0; k < places.size(); ++k) {
+    const double off = fit.surface.Point(places[k]).z() - Hills(places[k]);
+    within += std::abs(off) < 1.645 * sd[k] ? 1 : 0;
+  }
+  return within / static_cast<double>(places.size());
+}
+
+TEST(ErrorStructure, ErrorsOfNeighboursAreNotFollowed) {
+  constexpr double kNoise = 5e-3;
+  constexpr int kPoints = 10000;
+  double coverage = 0;
+  for (const bool is_rough : {false, true}) {
+    const CorrelatedErrors errors(0.02, is_rough, 9);
+    Random random(10);
+    Points points;
+    for (int k = 0; k < kPoints; ++k) {
+      const Vec2 at(random.Uniform(0, 1), random.Uniform(0, 1));
+      points.Add(at, Hills(at) + kNoise * errors(at));
+    }
+    const NestedFitResult fit = points.Fit();
+    EXPECT_LT(ErrorOf(fit.surface), 0.75 * kNoise);  // 0.85 to 1 if the errors are followed
+    EXPECT_LT(fit.report.effective_share, 0.3);
+    coverage += CoverageOf(fit, points) / 2;
+  }
+  EXPECT_GT(coverage, 0.8);
+  EXPECT_LT(coverage, 0.98);
+}
+
+// Detail without such a sign stays: rough everywhere, or fine in a part of the domain.
+TEST(ErrorStructure, DetailDoesNotCountAsErrorsOfNeighbours) {
+  for (const auto& height : {std::function<double(const Vec2&)>(testing::Fractal()),
+                             std::function<double(const Vec2&)>(testing::DetailHeight),
+                             std::function<double(const Vec2&)>(testing::Creases)}) {
+    Random random(11);
+    Points points;
+    for (int k = 0; k < 10000; ++k) {
+      const Vec2 at(random.Uniform(0, 1), random.Uniform(0, 1));
+      points.Add(at, height(at) + 5e-4 * random.Normal());
+    }
+    EXPECT_GT(points.Fit().report.effective_share, 0.7);
+  }
 }
 
 TEST(ErrorStructure, OutliersStandTogetherOnARidge) {
