@@ -918,7 +918,7 @@ class NestedFitter {
   // the median of their mean squares, over runs along the curve, over the mean. Errors correlated
   // over a fiftieth of the domain gave 0.9 to 1, detail in a tenth of the domain 0.24.
   bool AreAlikeEverywhere() {
-    constexpr std::size_t kRun = 256;
+    constexpr std::size_t kRun = 256, kFewestRuns = 8;  // of fewer the median tells little
     constexpr double kLeast = 0.6;
     std::vector<double> squares;
     double sum = 0, all = 0;
@@ -938,7 +938,7 @@ class NestedFitter {
       }
     }
     const auto runs = static_cast<double>(squares.size());
-    return !squares.empty() && UpperMedian(squares) > kLeast * all / runs;
+    return squares.size() >= kFewestRuns && UpperMedian(squares) > kLeast * all / runs;
   }
 
   // Fills the report, except for the statistics of distances (Measure).
