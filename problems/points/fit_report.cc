@@ -68,11 +68,11 @@ std::string Verdict(const AutoReport& r) {
            "look "
            "at them before you leave them out (fit.plan.outliers: keep)";
   }
-  if (LeavesDetail(r)) {
-    return "residuals are still correlated: part of what counts as noise is detail";
+  if (SharesErrors(r)) {
+    return "residuals are correlated, as errors that neighbours share: sd and intervals allow for "
+           "it";
   }
-  return SharesErrors(r) ? "residuals are correlated, as errors that neighbours share: sd and "
-                           "intervals allow for it"
+  return LeavesDetail(r) ? "residuals are still correlated: part of what counts as noise is detail"
                          : "residuals look like noise: these points show no more detail";
 }
 

@@ -100,7 +100,7 @@ std::shared_ptr<const SurfaceSigma> SigmaOver(const PointFit& result, const Give
                                               const HSplineSurface& start) {
   const AutoReport& report = *result.fit.automatic;
   const std::span<const double> weights = given.weights;
-  const SigmaOptions options{.noise_mm = report.noise_mm,
+  const SigmaOptions options{.noise_mm = report.noise_mm / std::sqrt(report.effective_share),
                              .weight = report.weight,
                              .stretch = report.stretch,
                              .direction_deg = report.direction_deg,
