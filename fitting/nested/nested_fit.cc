@@ -877,7 +877,7 @@ class NestedFitter {
   // parameters, if these are fewer than the space has. Vertices for the errors of neighbours would
   // only cost time in predictions. Returns whether they are.
   bool CoarsenFor(double parameters) {
-    constexpr double kVerticesPerParameter = 8;  // the error grows by less than a hundredth
+    constexpr double kVerticesPerParameter = 8;  // more slow predictions down
     NestedSpace coarse(start_.shape());
     while (coarse.Vertices() < kVerticesPerParameter * parameters && coarse.finest() < cap_) {
       OverlayDense(points_, coarse.finest(), /*points_per_patch=*/0, coarse);
