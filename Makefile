@@ -75,13 +75,13 @@ thesis: configure
 	@/usr/bin/python3 -B docs/thesis/make.py build-quick/problems/semblance out/thesis $(addprefix --only ,$(ONLY))
 
 # Every head of the folder HEADS that has a true skin, recovered with measured depths and with those of tables: one table, pictures, and the
-# table of docs/experiments/real-heads.md. ONLY="54 people.*" makes some.
+# table of docs/experiments/heads.md. ONLY="54 people.*" makes some.
 HEADS        ?= ../shared/data
 heads: PACKAGES = $(RUN_PACKAGES) python3
 heads: PRESET = quick
 heads: configure
 	@cmake --build --preset quick --target semblance
-	@/usr/bin/python3 -B docs/heads.py build-quick/problems/semblance $(HEADS) out/heads $(if $(ONLY),--only "$(ONLY)",--page docs/experiments/real-heads.md)
+	@/usr/bin/python3 -B docs/heads.py build-quick/problems/semblance $(HEADS) out/heads $(if $(ONLY),--only "$(ONLY)",--page docs/experiments/heads.md)
 
 test: build
 	@ctest --preset $(PRESET) -j "$$(nproc)"

@@ -108,7 +108,7 @@ def main():
     keep_pictures(rows, a.out)
     if a.page:
         page = a.page.read_text(encoding="utf-8")
-        new = re.sub("(<!-- heads -->\n).*?(\n<!-- end of heads -->)", lambda m: m[1] + "\n" + table + "\n" + m[2], page, flags=re.S)
+        new = re.sub("(<!-- heads -->\n).*?(<!-- end of heads -->)", lambda m: f"{m[1]}\n{table}\n\n{m[2]}", page, flags=re.S)
         if new == page and table not in page:
             sys.exit(f"heads.py: {a.page}: the lines <!-- heads --> and <!-- end of heads --> are not there; add them")
         a.page.write_text(new, encoding="utf-8")
