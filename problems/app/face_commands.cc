@@ -41,7 +41,6 @@ struct FaceArguments {
   std::vector<std::string> features;
   std::vector<double> weights;
   std::optional<double> chord_mm;
-  double blend_mm = 0;
   std::array<double, 2> u = {0, 1}, v = {0, 1};
   std::array<int, 2> levels = {1, 8};
   ModesPrior prior;
@@ -197,7 +196,7 @@ int FuseCommand(const FaceArguments& a) {
   std::ranges::copy(CheckHeadMesh(body, a.face), std::back_inserter(notes));
   const FusedMesh fused = [&] {
     try {
-      return FuseMeshes(body, feature, {.blend_mm = a.blend_mm});
+      return FuseMeshes(body, feature);
     } catch (const InputError& error) {
       throw InputError(fmt::format("{} and {}: {}", a.face, a.features[0], error.what()));
     }
@@ -356,10 +355,6 @@ void DeclareFuse(CLI::App& fuse, CommandLine& line) {
       ->required()
       ->expected(1);
   fuse.add_option("--out", a.out, "file for the fused mesh (.ply .obj .off .stl)")->required();
-  fuse.add_option("--blend_mm", a.blend_mm,
-                  "smooth the points within this distance of the seam [0: keep the crease]")
-      ->check(Finite())
-      ->check(CLI::NonNegativeNumber);
   AddForce(fuse, a);
 }
 

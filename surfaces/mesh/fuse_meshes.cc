@@ -4,9 +4,7 @@
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <CGAL/Polygon_mesh_processing/connected_components.h>
 #include <CGAL/Polygon_mesh_processing/corefinement.h>
-#include <CGAL/Polygon_mesh_processing/fair.h>
 #include <CGAL/Polygon_mesh_processing/measure.h>
-#include <CGAL/Polygon_mesh_processing/self_intersections.h>
 #include <CGAL/Surface_mesh.h>
 #include <fmt/format.h>
 
@@ -14,12 +12,10 @@
 #include <cmath>
 #include <map>
 #include <numbers>
-#include <set>
 #include <string>
 #include <vector>
 
 #include "surfaces/base/error.h"
-#include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::surfaces {
 namespace {
@@ -262,63 +258,12 @@ double AreaWhere(const Part& part, const std::vector<bool>& chosen) {
   return area_mm2;
 }
 
-std::vector<Vec3> SeamPoints(const Seam& seam) {
-  std::vector<Vec3> points;
-  for (const auto& [ends, h] : seam) {
-    points.emplace_back(ends[0].data());
-  }
-  return points;
-}
-
 double SeamLength(const Seam& seam) {
   double twice_mm = 0;
   for (const auto& [ends, h] : seam) {
     twice_mm += (Vec3(ends[1].data()) - Vec3(ends[0].data())).norm();
   }
   return twice_mm / 2;
-}
-
-// All neighbours count alike, because the cut leaves slivers at the seam, whose cotangents are
-// useless. It also spreads the vertices evenly.
-struct EqualWeights {
-  double w_i(Vertex /*v*/) const { return 1; }
-  double w_ij(HalfEdge /*h*/) const { return 1; }
-};
-
-// Throws if the triangles at the vertices meet each other.
-void RefuseFolds(const Mesh& mesh, const std::vector<Vertex>& vertices, double blend_mm) {
-  std::set<Face> at_seam;
-  for (const Vertex v : vertices) {
-    for (const Face f : CGAL::faces_around_target(mesh.halfedge(v), mesh)) {
-      at_seam.insert(f);
-    }
-  }
-  if (PMP::does_self_intersect(at_seam, mesh)) {
-    throw InputError(fmt::format(
-        "the surface folds where it is smoothed within {} mm of the seam; choose less", blend_mm));
-  }
-}
-
-// Moves the points within blend_mm of the seam onto a surface whose curvature changes smoothly.
-TriMesh Blend(const TriMesh& fused, const std::vector<Vec3>& seam, double blend_mm) {
-  Part part = ToPart(fused, "fused mesh");
-  const PointQuery to_seam(seam);
-  std::vector<Vertex> free;
-  for (const Vertex v : part.mesh.vertices()) {
-    if (!part.mesh.is_border(v) && to_seam.DistanceTo(At(part.mesh, v)) < blend_mm) {
-      free.push_back(v);
-    }
-  }
-  if (!PMP::fair(part.mesh, free, PMP::parameters::weight_calculator(EqualWeights{}))) {
-    throw InputError(fmt::format(
-        "within {} mm of the seam no smooth surface is determined; choose less", blend_mm));
-  }
-  TriMesh blended = fused;
-  for (const Vertex v : free) {
-    blended.points[v] = At(part.mesh, v);
-  }
-  RefuseFolds(part.mesh, free, blend_mm);
-  return blended;
 }
 
 // An inside-out feature would keep the part of the body that it should cover.
@@ -331,16 +276,9 @@ void RefuseTurned(const FusedMesh& fused, double body_mm2) {
   }
 }
 
-void CheckOptions(const FuseOptions& options) {
-  if (!(options.blend_mm >= 0) || !std::isfinite(options.blend_mm)) {
-    throw InputError(fmt::format("blend_mm is {}; it must be 0 or positive", options.blend_mm));
-  }
-}
-
 }  // namespace
 
-FusedMesh FuseMeshes(const TriMesh& body, const TriMesh& feature, const FuseOptions& options) {
-  CheckOptions(options);
+FusedMesh FuseMeshes(const TriMesh& body, const TriMesh& feature) {
   Part base = ToPart(body, "body");
   Part added = ToPart(feature, "feature");
   CutAlongSeam(base, added);
@@ -359,9 +297,6 @@ FusedMesh FuseMeshes(const TriMesh& body, const TriMesh& feature, const FuseOpti
   fused.covered_mm2 = Area(body) - AreaWhere(base, of_base.kept);
   fused.added_mm2 = AreaWhere(added, of_added.kept);
   RefuseTurned(fused, Area(body));
-  if (options.blend_mm > 0) {
-    fused.mesh = Blend(fused.mesh, SeamPoints(base_seam), options.blend_mm);
-  }
   return fused;
 }
 

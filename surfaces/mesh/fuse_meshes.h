@@ -6,12 +6,6 @@
 
 namespace semblance::surfaces {
 
-struct FuseOptions {
-  // The points within this distance of the seam move onto a smooth surface. 0 keeps the crease
-  // where the two surfaces meet, and moves no point. mm, >= 0.
-  double blend_mm = 0;
-};
-
 struct FusedMesh {
   TriMesh mesh;
   double seam_mm = kNaN;      // length of the curves along which the two meshes meet
@@ -25,11 +19,11 @@ struct FusedMesh {
 // the border of the body outside the feature. On which side a part lies is decided at the seam, by
 // the angles of the triangles around it, so no closed surface is needed.
 //
-// Triangles are counter-clockwise seen from outside. Throws InputError, with the place, if a mesh
-// is not a consistently oriented manifold; if a mesh meets itself near the other one, or lies on
-// it; if the meshes do not meet, or a seam ends at a border; if a piece of the feature stays apart;
-// if the feature covers more than half of the body, as an inside-out one does; and if the smoothed
-// surface folds.
-FusedMesh FuseMeshes(const TriMesh& body, const TriMesh& feature, const FuseOptions& options = {});
+// Triangles are counter-clockwise seen from outside. No point moves; the seam is a crease. Throws
+// InputError, with the place where there is one, if a mesh is not a consistently oriented manifold;
+// if a mesh meets itself near the other one, or lies on it; if the meshes do not meet, or a seam
+// ends at a border; if a piece of the feature stays apart; and if the feature covers more than half
+// of the body, as an inside-out one does.
+FusedMesh FuseMeshes(const TriMesh& body, const TriMesh& feature);
 
 }  // namespace semblance::surfaces
