@@ -159,16 +159,14 @@ bool IsOutside(const Part& part, HalfEdge h, const Part& other, HalfEdge o) {
   return Turn(left, angles.Of(ThirdCorner(part.mesh, h))) < Turn(left, right);
 }
 
-// How much of the seam around a component says that the component is outside or inside the other
-// mesh, mm.
+// The lengths of seam at which a component is outside and inside the other mesh, mm.
 struct SeamVotes {
   double outside_mm = 0, inside_mm = 0;
   Vec3 at = Vec3::Zero();  // on the seam
 };
 
 // Rounding moves the corners of edges much shorter than 1e-6 mm, so that some of them vote for the
-// wrong side. This share of a seam may do so. Where meshes lie on each other, about half of it
-// does.
+// wrong side. This share of a seam may do so. Half of it does where meshes lie on each other.
 constexpr double kWrongVotes = 1e-3;
 
 std::vector<SeamVotes> CountVotes(const Part& part, const Seam& seam, const Part& other,
