@@ -17,8 +17,8 @@ struct DomainGrid {
 
   std::size_t size() const { return static_cast<std::size_t>(columns) * rows; }
   Vec2 UvAt(std::size_t k) const {
-    return {static_cast<double>(k % columns) / (columns - 1),
-            static_cast<double>(k / columns) / (rows - 1)};
+    const std::size_t column = k % columns, row = k / columns;
+    return {static_cast<double>(column) / (columns - 1), static_cast<double>(row) / (rows - 1)};
   }
   std::size_t NearestTo(const Vec2& uv) const;  // index of the point
   // The bilinear interpolation of values at the points. uv: in [0,1] x [0,1].
