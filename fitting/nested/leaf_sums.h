@@ -21,6 +21,15 @@ struct NestedResidual {
   double Square() const { return along[0] * along[0] + along[1] * along[1] + along[2] * along[2]; }
 };
 
+// The residual, equally likely, of a point of mean weight.
+inline NestedResidual ScaledResidual(const NestedPoints& points, std::size_t k,
+                                     NestedResidual residual) {
+  for (double& along : residual.along) {
+    along *= points.Scale(k);
+  }
+  return residual;
+}
+
 struct LeafSums {
   Matrix16 gram;                                  // sum of w N_k N_l
   std::array<std::array<double, 16>, 4> right{};  // sum of w N_k value; the probe is last

@@ -47,7 +47,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <numeric>
 #include <optional>
 #include <span>
@@ -55,7 +54,9 @@
 
 #include "fitting/nested/error_structure.h"
 #include "fitting/nested/neighbour_noise.h"
+#include "fitting/nested/nested_surface.h"
 #include "fitting/nested/outlier_search.h"
+#include "fitting/nested/shared_errors.h"
 #include "fitting/nested/unresolved_detail.h"
 #include "fitting/nested/weight_search.h"
 #include "surfaces/base/error.h"
@@ -95,7 +96,6 @@ constexpr std::size_t kPatchesPerPoint = 4;  // of a tested level; more take tim
 // Ratio of neighbouring weights in the search, in rounds and in the final fit: solves against a
 // closer weight. The score is flat near its minimum.
 constexpr double kCoarseFactor = 4, kFineFactor = 2;
-constexpr std::size_t kResidualsAtOnce = 1 << 14;  // points; bounds the memory
 // Held-out error, relative to the extent, that is round-off: mean squares are differences of sums.
 constexpr double kRounding = 1e-8;
 
@@ -180,59 +180,6 @@ struct Snapshot {
   int round = -1;
 };
 
-// A displacement along the channels as a vector in space.
-Vec3 InSpace(const NestedPoints& points, const GridValues& values, int i, int j) {
-  Vec3 sum = Vec3::Zero();
-  for (int c = 0; c < points.channels; ++c) {
-    sum += values.Row(c, j)[i] * points.axes.col(c);
-  }
-  return sum;
-}
-
-// The offsets of a level's vertices from the next coarser surface, in its frame or the world's.
-std::map<VertexId, std::optional<Vec3>> MakeOffsets(const NestedSpace& space, int level,
-                                                    const NestedPoints& points,
-                                                    const ControlNet& rest,
-                                                    const GridValues& displacements,
-                                                    const HSplineSurface& surface) {
-  std::map<VertexId, std::optional<Vec3>> offsets;
-  const NestedLevel& nested = space[level];
-  const bool world = surface.shape().reference == OffsetReference::kWorld;
-  for (int i = 0; i < rest.columns; ++i) {
-    for (int j = 0; j < rest.rows; ++j) {
-      if (nested.active[nested.layout.At(i, j)] == 0 || space.IsCovered(level, i, j)) {
-        continue;
-      }
-      const VertexId vertex{level, i, j};
-      const SurfaceFrame frame = surface.LevelFrame(level - 1, surface.GrevillePoint(vertex));
-      const Vec3 way = rest.At(i, j) + InSpace(points, displacements, i, j) - frame.point;
-      offsets.emplace_hint(offsets.end(), vertex, world ? way : Vec3(frame.axes.transpose() * way));
-    }
-  }
-  return offsets;
-}
-
-// The start plus the displacements as an H-spline, level by level, because an offset is measured
-// from the next coarser surface.
-HSplineSurface MakeSurface(const HSplineSurface& start, const NestedSpace& space,
-                           const NestedPoints& points, const NestedValues& displacements) {
-  HSplineShape shape = start.shape();
-  shape.max_level = space.finest();
-  ControlNet net = start.Net(0);
-  for (int j = 0; j < net.rows; ++j) {
-    for (int i = 0; i < net.columns; ++i) {
-      net.At(i, j) += InSpace(points, displacements[0], i, j);
-    }
-  }
-  HSplineSurface surface(shape, net);
-  ControlNet rest = start.Net(0);
-  for (int level = 1; level <= space.finest(); ++level) {
-    rest = Refine(shape, rest, level - 1);
-    surface.SetOffsets(MakeOffsets(space, level, points, rest, displacements[level], surface));
-  }
-  return surface;
-}
-
 class NestedFitter {
  public:
   NestedFitter(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
@@ -247,7 +194,7 @@ class NestedFitter {
         cap_(FinestAllowed(plan, start.shape())),
         held_(ChooseHeldOut(points_)),
         outlier_(points_.size(), 0),
-        least_noise_square_(RoundingNoise()) {
+        least_noise_square_(RoundingNoiseSquare(points_)) {
     finest_ = FinestByDensity(points_, 1, space_[0].layout, cap_);
   }
 
@@ -414,7 +361,7 @@ class NestedFitter {
     double weights = 0;
     ForEachSampled([&](std::size_t n, std::uint32_t k) {
       if (held_[k] != 0 && outlier_[k] == 0) {
-        squares.push_back(Scaled(residuals_[n], k).Square());
+        squares.push_back(ScaledResidual(points_, k, residuals_[n]).Square());
         of_sampled[n] = static_cast<float>(squares.back());
         weights += points_.Scale(k) * points_.Scale(k);
       }
@@ -458,7 +405,8 @@ class NestedFitter {
     std::vector<float> errors_mm(residuals_.size(), std::nanf(""));
     ForEachSampled([&](std::size_t n, std::uint32_t k) {
       if (held_[k] != 0) {
-        errors_mm[n] = static_cast<float>(std::sqrt(Scaled(residuals_[n], k).Square()));
+        errors_mm[n] =
+            static_cast<float>(std::sqrt(ScaledResidual(points_, k, residuals_[n]).Square()));
       }
     });
     return errors_mm;
@@ -543,15 +491,6 @@ class NestedFitter {
     return gain.IsSure();
   }
 
-  // The least noise of heights that were rounded to a lattice, along one axis; 0 for others. A
-  // surface with less follows the steps of the rounding.
-  double RoundingNoise() const {
-    constexpr double kAlongZ = 0.999;
-    const bool is_rounded = points_.lattice_mm > 0 && points_.channels == 1 && !points_.weighted &&
-                            std::abs(points_.axes(2, 0)) > kAlongZ && !LieAlongLines(points_);
-    return is_rounded ? points_.lattice_mm * points_.lattice_mm / 12 : 0;
-  }
-
   // Takes the largest weight at which the points still lie within half a step of the lattice, as
   // far as any does, if the search has chosen less noise than rounding makes. Errors of rounding
   // follow the surface, so their size alone does not show how smooth it is: it is less than step /
@@ -559,27 +498,10 @@ class NestedFitter {
   NestedWeight SmoothWithinRounding(NestedWeightSearch& search, std::size_t count) {
     const NestedWeight found = search.Finish();
     is_rounded_below_ = found.NoiseSquare(static_cast<double>(count)) < least_noise_square_;
-    return is_rounded_below_ ? search.SmoothWhileFits([this] { return BeyondRounding(); }) : found;
-  }
-
-  // The mean square, over the inliers, of what residuals exceed half a step of the lattice by.
-  double BeyondRounding() {
-    const double half_mm = points_.lattice_mm / 2;
-    double sum = 0;
-    std::size_t count = 0;
-    NestedResiduals residuals(solve_);
-    for (std::size_t begin = 0; begin < points_.size(); begin += kResidualsAtOnce) {
-      const std::size_t end = std::min(begin + kResidualsAtOnce, points_.size());
-      const std::span<const Residual> some = residuals.Of(begin, end);
-      for (std::size_t k = begin; k < end; ++k) {
-        if (outlier_[k] == 0) {
-          const double beyond = std::max(std::sqrt(some[k - begin].Square()) - half_mm, 0.0);
-          sum += beyond * beyond;
-          ++count;
-        }
-      }
-    }
-    return sum / static_cast<double>(std::max<std::size_t>(count, 1));
+    return is_rounded_below_ ? search.SmoothWhileFits([this] {
+      return MeanSquareBeyondRounding(solve_, points_, outlier_);
+    })
+                             : found;
   }
 
   // Returns whether cross-validation would follow the rounding; finer vertices would only do so
@@ -589,14 +511,6 @@ class NestedFitter {
   // Returns whether the held-out points are met to round-off: points without noise on a surface of
   // the space.
   bool IsMet() const { return report_.rounds.back().held_out_rms_mm <= rounding_mm_; }
-
-  // The residual of a point of mean weight that is equally likely.
-  Residual Scaled(Residual residual, std::uint32_t k) const {
-    for (double& along : residual.along) {
-      along *= points_.Scale(k);
-    }
-    return residual;
-  }
 
   // The standard deviation of held-out points along one axis, by the median.
   double HeldOutSd(std::vector<double> squares) const {
@@ -691,7 +605,7 @@ class NestedFitter {
     kept.reserve(residuals_.size());
     ForEachSampled([&](std::size_t n, std::uint32_t k) {
       if (outlier_[k] == 0) {
-        kept.push_back(Scaled(residuals_[n], k));
+        kept.push_back(ScaledResidual(points_, k, residuals_[n]));
       }
     });
     return kept;
@@ -751,29 +665,24 @@ class NestedFitter {
   void Measure(NestedFitResult& result) {
     double sum = 0, weights = 0;
     result.residual_mm.resize(points_.GivenSize());
-    NestedResiduals residuals(solve_);
     PairCorrelation neighbours;
     const FileRuns runs = FindFileRuns(points_);
     DesignEffect effect(runs);
     std::optional<Residual> last;
-    for (std::size_t begin = 0; begin < points_.size(); begin += kResidualsAtOnce) {
-      const std::size_t end = std::min(begin + kResidualsAtOnce, points_.size());
-      const std::span<const Residual> some = residuals.Of(begin, end);
-      for (std::size_t k = begin; k < end; ++k) {
-        const double square = some[k - begin].Square();
-        result.residual_mm[points_.given[k]] = std::sqrt(square);
-        sum += points_.Weight(k) * square;
-        weights += points_.Weight(k);
-        if (outlier_[k] == 0) {
-          const Residual scaled = Scaled(some[k - begin], static_cast<std::uint32_t>(k));
-          if (last) {
-            neighbours.Add(*last, scaled);
-          }
-          last = scaled;
-          effect.Add(k, scaled);
+    NestedResiduals(solve_).ForEach([&](std::size_t k, const Residual& residual) {
+      const double square = residual.Square();
+      result.residual_mm[points_.given[k]] = std::sqrt(square);
+      sum += points_.Weight(k) * square;
+      weights += points_.Weight(k);
+      if (outlier_[k] == 0) {
+        const Residual scaled = ScaledResidual(points_, k, residual);
+        if (last) {
+          neighbours.Add(*last, scaled);
         }
+        last = scaled;
+        effect.Add(k, scaled);
       }
-    }
+    });
     report_.effective_share =
         report_.met_to_rounding ? 1
         : shared_ ? std::min(1.0, std::pow(report_.noise_mm, 2) / shared_->square_per_parameter)
@@ -860,10 +769,10 @@ class NestedFitter {
       return found;
     }
     const NestedSolve::Packed solution = solve_.Solution();
-    shared_ = search.FindSharedErrors(found.weight, MostShared());
+    shared_ = search.FindSharedErrors(found.weight, MostSharedSquare(points_, outlier_));
     if (shared_) {
       const NestedWeight smoother = search.FinalSolve(shared_->weight);
-      if (AreAlikeEverywhere()) {
+      if (AreAlikeEverywhere(solve_, points_, outlier_)) {
         return smoother;
       }
       shared_.reset();
@@ -896,49 +805,6 @@ class NestedFitter {
     constexpr std::size_t kMostPointsPerVertex = 8;
     return report_.held_out_rms_mm > rounding_mm_ &&
            points_.size() < kMostPointsPerVertex * static_cast<std::size_t>(space_.Vertices());
-  }
-
-  // The largest mean square of errors along one axis that count as shared, as a part of that of the
-  // points' displacements; larger ones may be the surface.
-  double MostShared() const {
-    constexpr double kMostShare = 0.0025;  // a twentieth of the heights
-    Vec3 sum = Vec3::Zero(), squares = Vec3::Zero();
-    double count = 0;
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-      if (outlier_[k] == 0) {
-        sum += points_.value[k];
-        squares += points_.value[k].cwiseAbs2();
-        ++count;
-      }
-    }
-    return kMostShare * (squares / count - (sum / count).cwiseAbs2()).sum() / points_.channels;
-  }
-
-  // Returns whether the last solution's residuals are about as large in all parts of the domain:
-  // the median of their mean squares, over runs along the curve, over the mean. Errors correlated
-  // over a fiftieth of the domain gave 0.9 to 1, detail in a tenth of the domain 0.24.
-  bool AreAlikeEverywhere() {
-    constexpr std::size_t kRun = 256, kFewestRuns = 8;  // of fewer the median tells little
-    constexpr double kLeast = 0.6;
-    std::vector<double> squares;
-    double sum = 0, all = 0;
-    std::size_t count = 0;
-    NestedResiduals residuals(solve_);
-    for (std::size_t begin = 0; begin < points_.size(); begin += kResidualsAtOnce) {
-      const std::size_t end = std::min(begin + kResidualsAtOnce, points_.size());
-      const std::span<const Residual> some = residuals.Of(begin, end);
-      for (std::size_t k = begin; k < end; ++k) {
-        if (outlier_[k] == 0) {
-          sum += Scaled(some[k - begin], static_cast<std::uint32_t>(k)).Square();
-          if (++count % kRun == 0) {
-            squares.push_back(sum);
-            all += std::exchange(sum, 0);
-          }
-        }
-      }
-    }
-    const auto runs = static_cast<double>(squares.size());
-    return squares.size() >= kFewestRuns && UpperMedian(squares) > kLeast * all / runs;
   }
 
   // Fills the report, except for the statistics of distances (Measure).
@@ -1004,7 +870,7 @@ class NestedFitter {
   BendingMetric metric_ = BendingMetric::Identity();
   int finest_scanned_ = -1;  // finest level at which stretched metrics were tried
   // Errors that points share.
-  double least_noise_square_;           // RoundingNoise
+  double least_noise_square_;           // RoundingNoiseSquare
   std::optional<SharedErrors> shared_;  // of the final fit
   bool is_rounded_below_ = false;       // of the last search
   // The progress.

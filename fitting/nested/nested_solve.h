@@ -3,6 +3,7 @@
 // once.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -133,6 +134,19 @@ class NestedResiduals {
 
   // The residuals of points begin .. end - 1. Valid until the next call.
   std::span<const NestedResidual> Of(std::size_t begin, std::size_t end);
+
+  // Calls visit(k, residual) for all points, in the order of the curve.
+  template <class Visit>
+  void ForEach(const Visit& visit) {
+    constexpr std::size_t kAtOnce = 1 << 14;  // bounds the memory
+    const std::size_t count = solve_.points_.size();
+    for (std::size_t begin = 0; begin < count; begin += kAtOnce) {
+      std::size_t k = begin;
+      for (const NestedResidual& residual : Of(begin, std::min(begin + kAtOnce, count))) {
+        visit(k++, residual);
+      }
+    }
+  }
 
  private:
   NestedSolve& solve_;

@@ -60,11 +60,11 @@ double RiseToMiddle(const Vec2& a, const Vec2& b) {
 // Four points on one circle, as those of a grid, have two Delaunay links. Takes the one whose upper
 // end is nearer to u = 1/2, so that the mirror image of the points gets the mirrored links.
 void ChooseLinks(std::span<const Vec2> uv, Delaunay& delaunay) {
-  using Vertex = Delaunay::Vertex_handle;
-  std::vector<std::pair<Vertex, Vertex>> turned;
+  using Handle = Delaunay::Vertex_handle;
+  std::vector<std::pair<Handle, Handle>> turned;
   for (auto edge = delaunay.finite_edges_begin(); edge != delaunay.finite_edges_end(); ++edge) {
     const auto& [face, k] = *edge;
-    const Vertex a = face->vertex(Delaunay::ccw(k)), b = face->vertex(Delaunay::cw(k)),
+    const Handle a = face->vertex(Delaunay::ccw(k)), b = face->vertex(Delaunay::cw(k)),
                  c = face->vertex(k), d = delaunay.mirror_vertex(face, k);
     if (delaunay.is_infinite(c) || delaunay.is_infinite(d) ||
         !OnOneCircle(
