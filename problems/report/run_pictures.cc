@@ -58,17 +58,12 @@ Image WriteSheet(const char* name, const Scene& scene, Lighting lighting, Shadow
   return std::move(sides.front());
 }
 
-// Writes the head framed by itself. Returns it from the front in the frame of the other pictures.
-Image WriteBust(Album& album) {
-  std::vector<Camera> cameras = CamerasFor(kViews, Bounds(album.result.bust->skin), kPictureAspect);
-  cameras.push_back(album.cameras.front());
+// Returns the head in the frame of the other pictures.
+Image HeadFromFront(const Album& album) {
   ShadowMaps shadows;
-  std::vector<Image> sides = RenderAll(HeadScene(album.result), cameras,
-                                       PictureOptions(Lighting::kStudio), shadows, album.threads);
-  Image front = std::move(sides.back());
-  sides.pop_back();
-  album.folder.Write("pictures/bust.png", EncodePng(ContactSheet(sides)));
-  return front;
+  return std::move(RenderAll(HeadScene(album.result), {album.cameras.data(), 1},
+                             PictureOptions(Lighting::kStudio), shadows, album.threads)
+                       .front());
 }
 
 Colour StatusColour(SkinStatus status) {
@@ -115,42 +110,9 @@ Image WriteTruth(Album& album) {
   Image front =
       WriteColourings({{"pictures/truth.png", "pictures/scored.png"}}, SkinObject(skin),
                       {{{}, StatusColours(truth.skin)}}, Lighting::kStudio, shadows, album);
-  const std::vector<double>& of_face = truth.face.signed_mm;
-  WriteColourings(
-      {{"pictures/error.png", "pictures/error_implicit.png"}},
-      MappedObject(skin, of_face, ErrorColours()),
-      {{ColoursAt(ErrorColours(), of_face), ColoursAt(ErrorColours(), truth.implicit.signed_mm)}},
-      Lighting::kEven, shadows, album);
+  WriteSheet("pictures/error.png", {{MappedObject(skin, truth.face.signed_mm, ErrorColours())}},
+             Lighting::kEven, shadows, album);
   return front;
-}
-
-std::vector<Colour> ColoursByOrigin(const TriMesh& mesh, const Album& album) {
-  std::vector<Colour> colours;
-  for (const BoneOrigin origin :
-       OriginUnder(mesh, album.result.shell, album.result.origin, album.threads)) {
-    colours.push_back(OriginColour(origin));
-  }
-  return colours;
-}
-
-// Returns whether some bone is not observed.
-bool HasOrigins(const RunResult& result) {
-  const auto [observed, mirrored, inferred] = AreaByOrigin_cm2(result.shell, result.origin);
-  return mirrored + inferred > 0;
-}
-
-// Writes the shell by its depth and, unless all bone is observed, by the origin of the bone.
-void WriteShell(Album& album) {
-  const RunResult& result = album.result;
-  ShadowMaps shadows;
-  WriteSheet("pictures/depth.png",
-             {{MappedObject(result.shell, result.depth.depth_mm, DepthColours())}}, Lighting::kEven,
-             shadows, album);
-  if (HasOrigins(result)) {
-    SceneObject shell = SkullObject(result.shell);
-    shell.vertex_colours = ColoursByOrigin(shell.mesh, album);
-    WriteSheet("pictures/origin.png", {{std::move(shell)}}, Lighting::kStudio, shadows, album);
-  }
 }
 
 // Returns the implicit surface from the front.
@@ -236,22 +198,17 @@ void WriteFit(Album& album) {
   WriteSheet("pictures/fit.png", scene, Lighting::kStudio, shadows, album);
 }
 
-// Writes the face, by the origin of the bone below it and by its sigma. Returns it from the front.
+// Writes the face, also by its sigma. Returns it from the front.
 Image WriteFace(Album& album) {
   const RunResult& result = album.result;
-  const SceneObject face = SkinObject(result.face.mesh);
-  std::vector<std::vector<Colour>> colourings = {{}};
-  if (HasOrigins(result)) {
-    colourings.push_back(ColoursByOrigin(face.mesh, album));
-  }
+  const TriMesh& face = result.face.mesh;
   ShadowMaps shadows;
-  Image front = WriteColourings({{"pictures/face.png", "pictures/origin_face.png"}}, face,
-                                colourings, Lighting::kStudio, shadows, album);
+  Image front =
+      WriteSheet("pictures/face.png", {{SkinObject(face)}}, Lighting::kStudio, shadows, album);
   const auto& uncertainty = result.uncertainty;
   if (uncertainty && !uncertainty->sigma_mm.empty()) {
-    WriteSheet("pictures/sigma.png",
-               {{MappedObject(face.mesh, uncertainty->sigma_mm, SigmaColours())}}, Lighting::kEven,
-               shadows, album);
+    WriteSheet("pictures/sigma.png", {{MappedObject(face, uncertainty->sigma_mm, SigmaColours())}},
+               Lighting::kEven, shadows, album);
   }
   return front;
 }
@@ -310,11 +267,10 @@ void WritePictures(const RunResult& result, OutputFolder& folder, const RunConte
   context.Report("pictures");
   Album album{.result = result, .folder = folder, .threads = context.threads};
   std::vector<Image> overview = {WriteSkull(album)};
-  WriteShell(album);
   overview.push_back(WriteImplicit(album));
   overview.push_back(WriteFace(album));
   if (result.bust) {
-    overview.push_back(WriteBust(album));
+    overview.push_back(HeadFromFront(album));
   }
   WriteFit(album);
   if (result.truth) {

@@ -25,10 +25,11 @@ std::vector<double> SignedErrors(const TriMesh& mesh, const RunResult& result,
 // The head with open eyes, or the face if the run made no head.
 Scene HeadScene(const RunResult& result);
 
-// Writes pictures/overview.png and, from front, three quarters and side, skull_dowels, depth,
-// implicit, face and face_over_skull. Writes fit, bust, origin and sigma if the run has them, and
-// truth, scored and error (on the true skin) if the true skin is known. Captions and legends are in
-// the report (run_report.h), not in the pictures.
+// Writes pictures/overview.png and, from front, three quarters and side, skull_dowels,
+// implicit, face and face_over_skull. Writes fit and sigma if the run has them, and truth, scored
+// and error (on the true skin) if the true skin is known. Depth, the origin of the bone and the
+// head are layers of the 3-D view (scene_json.h). Captions and legends are in the report
+// (run_report.h), not in the pictures.
 void WritePictures(const RunResult& result, OutputFolder& folder, const RunContext& context);
 
 }  // namespace semblance::problems

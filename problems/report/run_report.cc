@@ -326,13 +326,8 @@ ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
       "excludes (see resolved.yaml, region, and the picture of the scored skin). Distances go to "
       "the closest point and are weighted by area. Nothing was aligned to the true skin, except "
       "where a table says so."};
-  section.images = {
-      ReportImageFromFile(
-          folder.Root() / "pictures/error_implicit.png", "Signed error of the first face.",
-          "signed error of the first face on the true skin",
-          {{ErrorColours(), "first face outside (+) or inside (\u2212) the true skin"}}),
-      ReportImageFromFile(folder.Root() / "pictures/truth.png", "The true skin.",
-                          "the true skin from three sides")};
+  section.images = {ReportImageFromFile(folder.Root() / "pictures/truth.png", "The true skin.",
+                                        "the true skin from three sides")};
   section.images.push_back(
       {QuantilePlotSvg({{"recovered face", Numbers(result.at("face").at("quantiles_mm"))},
                         {"first face (implicit surface)",
@@ -350,20 +345,20 @@ ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
 ReportSection PictureSection(const OutputFolder& folder) {
   struct Picture {
     const char *file, *caption;
-    std::vector<Legend> legends = {};
   };
-  ReportSection section{.heading = "From skull to face, in pictures", .folded = true};
+  ReportSection section{.heading = "From skull to face, in pictures",
+                        .paragraphs = {"The 3-D view also shows the tissue depth on the skull and, "
+                                       "where the run has them, the head and the errors of both "
+                                       "faces."},
+                        .folded = true};
   for (const Picture& picture : std::vector<Picture>{
            {"skull_dowels", "Skull with depth markers."},
-           {"depth",
-            "Interpolated tissue depth on the skull's shell.",
-            {{DepthColours(), "tissue depth"}}},
            {"implicit", "First face, straight from the depths (implicit surface)."},
            {"face", "Recovered face."},
            {"face_over_skull", "Recovered face, translucent, over skull and depth markers."}}) {
-    section.images.push_back(ReportImageFromFile(
-        folder.Root() / "pictures" / fmt::format("{}.png", picture.file), picture.caption,
-        fmt::format("from three sides: {}", picture.caption), picture.legends));
+    section.images.push_back(
+        ReportImageFromFile(folder.Root() / "pictures" / fmt::format("{}.png", picture.file),
+                            picture.caption, fmt::format("from three sides: {}", picture.caption)));
   }
   return section;
 }
@@ -449,22 +444,16 @@ bool IsPartlyInvented(const Json& result) {
                                         0;
 }
 
-ReportSection BoneSection(const Json& bone, const OutputFolder& folder) {
+ReportSection BoneSection(const Json& bone) {
   return {
       .heading = "Observed and invented bone",
       .paragraphs = {fmt::format(
           "{} cm² of the shell that carries the tissue lie on bone of the scan. The rest is "
           "invented: {} cm² are mirrored from the other side (blue), and {} cm² are inferred where "
           "the shell bridges temples, orbits and gaps (yellow). The face above invented bone is "
-          "not evidence.",
+          "not evidence. \"Bone by origin\" in the 3-D view shows where.",
           Number(bone.at("observed_cm2"), 0), Number(bone.at("mirrored_cm2"), 0),
           Number(bone.at("inferred_cm2"), 0))},
-      .images = {ReportImageFromFile(folder.Root() / "pictures/origin.png",
-                                     "Bone: observed (white), mirrored (blue), inferred (yellow).",
-                                     "observed, mirrored and inferred bone from three sides"),
-                 ReportImageFromFile(folder.Root() / "pictures/origin_face.png",
-                                     "The face, coloured by the bone under it.",
-                                     "the face by the bone under it, from three sides")},
       .folded = true};
 }
 
@@ -645,7 +634,7 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
     sections.push_back(std::move(cuts));
   }
   if (IsPartlyInvented(result)) {
-    sections.push_back(BoneSection(result.at("bone"), folder));
+    sections.push_back(BoneSection(result.at("bone")));
   }
   sections.push_back({.heading = "Depth at the landmarks",
                       .paragraphs = TurnedDowels(folder.Root() / "dowels.csv"),

@@ -107,8 +107,7 @@ class SceneWriter {
         {{"id", id}, {"label", label}, {"colour", colour}, {"mesh", blobs_.AddMesh(mesh)}});
   }
 
-  // Adds the bone in the colours of pictures/origin.png (mirrored blue, inferred yellow). Skipped
-  // if all bone was observed.
+  // Adds the bone by its origin: mirrored blue, inferred yellow. Skipped if all bone was observed.
   void Origin() {
     const auto part = [&](BoneOrigin origin) {
       std::vector<bool> keep;
