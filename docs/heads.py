@@ -34,7 +34,7 @@ TREATMENTS = [
 
 
 # What is assumed of a head that configs/heads does not know.
-ANY = {"title": "A head with a true skin", "subject": {"type": "files"}, "tissue": {"depths": "measured"}, "network": str(ROOT / "configs/networks/standard32.yaml")}
+ANY = {"title": "A head with a true skin", "subject": {"type": "files"}, "tissue": {"depths": "skin"}, "network": str(ROOT / "configs/networks/standard32.yaml")}
 
 
 def heads_in(folder, base):

@@ -78,6 +78,24 @@ void Put(const Measured& measured, std::size_t vertex, TruthMap& map) {
 
 }  // namespace
 
+std::string_view DescribeStatus(TruthStatus status) {
+  switch (status) {
+    case TruthStatus::kValid:
+      return "";
+    case TruthStatus::kNoDirection:
+      return "the bone has no direction there";
+    case TruthStatus::kNoHit:
+      return "no skin along the normal";
+    case TruthStatus::kTooFar:
+      return "no skin near";
+    case TruthStatus::kGrazing:
+      return "the skin is met at a grazing angle";
+    case TruthStatus::kBehind:
+      return "the closest skin is behind the bone";
+  }
+  return "";
+}
+
 DepthTruth MeasureDepthTruth(const TriMesh& skull, std::span<const Vec3> directions,
                              const TriMesh& skin, const DepthTruthOptions& options,
                              const RunContext& run) {

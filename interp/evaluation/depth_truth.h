@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "surfaces/base/fields.h"
@@ -41,6 +42,9 @@ enum class TruthStatus : std::uint8_t {
   kGrazing,      // the angle to the skin's normal is above max_grazing_deg
   kBehind        // the closest skin lies on the inner side of the bone
 };
+
+// The reason why there is no depth, e.g. "no skin along the normal"; empty for kValid.
+std::string_view DescribeStatus(TruthStatus status);
 
 // The depths of one convention.
 struct TruthMap {

@@ -154,10 +154,10 @@ struct RecentreArguments : WorkOptions {
 
 Experiment ReadKnown(const fs::path& config, const RecentreArguments& a) {
   auto experiment = ReadConfig<Experiment>(config, a.overrides);
-  if (experiment.tissue.depths != DepthSource::kMeasured) {
+  if (!experiment.tissue.AreMeasured()) {
     throw InputError(
         fmt::format("{}: its depths come from a table; recentring needs measured depths (tissue: "
-                    "{{depths: measured}})",
+                    "{{depths: measured}}, or skin)",
                     config.string()));
   }
   return experiment;

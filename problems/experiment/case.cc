@@ -8,6 +8,7 @@
 
 #include "problems/experiment/extra_dowels.h"
 #include "problems/experiment/limit_depths.h"
+#include "problems/experiment/skin_depths.h"
 #include "problems/subject/condition_depths.h"
 #include "problems/subject/head_planes.h"
 #include "problems/subject/landmark_files/read_landmarks.h"
@@ -365,9 +366,11 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment, const RunCo
   return MakeCase(data, experiment, MeshQuery(data.skull), context);
 }
 
-Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQuery& query,
-              const RunContext& context) {
-  CheckNetworkNamed(experiment);
+namespace {
+
+// The case of a subject whose landmarks hold the depths that the experiment needs.
+Case CaseOf(const SubjectData& data, const Experiment& experiment, const MeshQuery& query,
+            const RunContext& context) {
   Case subject = StartCase(data, experiment, query);
   subject.expected_on_bone = ExpectedDowels(experiment, data.landmarks, subject.dowels_on_bone);
   GiveDepths(data, experiment, query, subject);
@@ -381,6 +384,19 @@ Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQ
   LayScoredNetwork(plan, subject);
   AppendInputs(experiment, subject);
   return subject;
+}
+
+}  // namespace
+
+Case MakeCase(const SubjectData& data, const Experiment& experiment, const MeshQuery& query,
+              const RunContext& context) {
+  CheckNetworkNamed(experiment);
+  if (experiment.tissue.depths != DepthSource::kSkin) {
+    return CaseOf(data, experiment, query, context);
+  }
+  SubjectData measured = data;
+  Append(measured.notes, MeasureOnSkin(experiment, query, context, measured));
+  return CaseOf(measured, experiment, query, context);
 }
 
 void CheckFaceOptions(const Experiment& experiment, const Case& subject) {

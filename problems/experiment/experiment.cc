@@ -141,6 +141,16 @@ void CheckBounds(const Experiment& experiment, std::vector<OptionFault>& faults)
   }
 }
 
+// Depths on the skin need a file of it; phantoms and volumes have their own.
+void CheckSkinNamed(const Experiment& experiment, std::vector<OptionFault>& faults) {
+  const auto* const files = std::get_if<FileSubject>(&experiment.subject);
+  if (experiment.tissue.depths == DepthSource::kSkin && files != nullptr && files->skin.empty()) {
+    faults.push_back({"tissue.depths",
+                      "skin: the subject names no true skin to measure on; name one under "
+                      "subject.skin, or take `table` or `measured`"});
+  }
+}
+
 // The table's mean adds no information to the table's own depths.
 void CheckExpected(const Experiment& experiment, std::vector<OptionFault>& faults) {
   for (const std::string& option : TableMeans(WayToDepth(experiment))) {
@@ -350,6 +360,7 @@ std::vector<OptionFault> FaultsBetween(const Experiment& experiment) try {
     faults.push_back({"sites." + fault.path, fault.what});
   }
   CheckBounds(experiment, faults);
+  CheckSkinNamed(experiment, faults);
   CheckExpected(experiment, faults);
   CheckPhantom(experiment.subject, faults);
   CheckRegion(experiment.region, faults);

@@ -309,7 +309,7 @@ CarriedDowels MakeCarriedDowels(const Experiment& experiment, const SubjectData&
     dowel.role = PointRole::kInserted;
     if (HasDepth(experiment.tissue, data.landmarks, site)) {
       carried.filled.push_back(std::move(dowel));
-    } else if (experiment.tissue.depths == DepthSource::kMeasured) {
+    } else if (experiment.tissue.AreMeasured()) {
       carried.open.push_back(std::move(dowel));
     }
   }

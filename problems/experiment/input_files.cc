@@ -228,8 +228,9 @@ CheckFindings InputCheck::CheckTissue(const Experiment& experiment) {
       found.warnings = TableWarnings(ReadTissueTable(table));
     }));
   }
-  const bool measured = experiment.tissue.depths == DepthSource::kMeasured;
-  if (findings.sound() && !(IsPhantom(experiment) && measured)) {
+  const bool measures = experiment.tissue.depths == DepthSource::kSkin ||
+                        (IsPhantom(experiment) && experiment.tissue.AreMeasured());
+  if (findings.sound() && !measures) {
     const std::string key = StageKey("cover", experiment.tissue, experiment.sites) +
                             (IsPhantom(experiment) ? "" : StageKey("of", experiment.subject));
     findings.Add(Once(key, [&](CheckFindings& found) {
@@ -271,8 +272,8 @@ CheckFindings InputCheck::CheckCase(const Experiment& experiment) {
   }
   const std::string key =
       StageKey("case", experiment.subject, experiment.landmarks, experiment.tissue,
-               experiment.sites, experiment.network, experiment.rules, WayToFace(experiment),
-               experiment.face_template, experiment.prior);
+               experiment.depth_truth, experiment.sites, experiment.network, experiment.rules,
+               WayToFace(experiment), experiment.face_template, experiment.prior);
   return Once(key, [&](CheckFindings& found) {
     const auto subject = loaded_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
       return LoadSubject(experiment.subject, context_);

@@ -55,7 +55,7 @@ class KnownSites {
 
   bool Contains(const std::string& site) const {
     const auto own = experiment_.sites.find(site);
-    return experiment_.tissue.depths == DepthSource::kMeasured || given_.contains(site) ||
+    return experiment_.tissue.AreMeasured() || given_.contains(site) ||
            !FindSetKey(experiment_.tissue, site).empty() ||
            (own != experiment_.sites.end() && own->second.depth);
   }

@@ -238,7 +238,7 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
 // The key of the depth. It includes the generic face if a dowel is placed by its (u,v).
 std::string MakeDepthKey(const Experiment& e) {
   std::string key = StageKey("depth", e.subject, e.landmarks, e.tissue, e.sites, e.network,
-                             WayToDepth(e), e.outside, e.fill);
+                             WayToDepth(e), e.outside, e.fill, e.depth_truth);
   return std::ranges::any_of(e.sites, [](const auto& entry) { return entry.second.uv.has_value(); })
              ? key + StageKey("placed on", e.face_template, e.placement)
              : key;

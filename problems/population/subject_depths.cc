@@ -220,24 +220,6 @@ bool IsExcluded(const PopulationSubject& subject, const std::string& site) {
   });
 }
 
-std::string DescribeStatus(TruthStatus status) {
-  switch (status) {
-    case TruthStatus::kValid:
-      return "";
-    case TruthStatus::kNoDirection:
-      return "the bone has no direction there";
-    case TruthStatus::kNoHit:
-      return "no skin along the normal";
-    case TruthStatus::kTooFar:
-      return "no skin near";
-    case TruthStatus::kGrazing:
-      return "the skin is met at a grazing angle";
-    case TruthStatus::kBehind:
-      return "the closest skin is behind the bone";
-  }
-  return "";
-}
-
 // Gives each depth marker of a standard site the direction that the bone has there on average.
 void TurnToAverage(const LandmarkFile& landmarks, std::vector<Dowel>& dowels) {
   const Mat3 rotation = FitAverageSkull(landmarks.Points()).skull_from_average.rotation;
@@ -279,10 +261,11 @@ std::vector<SiteDepth> DepthsAtSites(const PopulationSubject& subject, const Mar
   std::vector<SiteDepth> sites;
   for (std::size_t k = 0; k < dowels.size(); ++k) {
     const bool excluded = IsExcluded(subject, dowels[k].site);
-    sites.push_back({.site = dowels[k].site,
-                     .depth_mm = excluded ? kNaN : truth.depth_mm[k],
-                     .confidence = marked.confidence.at(dowels[k].site),
-                     .why_not = excluded ? "excluded" : DescribeStatus(truth.status[k])});
+    sites.push_back(
+        {.site = dowels[k].site,
+         .depth_mm = excluded ? kNaN : truth.depth_mm[k],
+         .confidence = marked.confidence.at(dowels[k].site),
+         .why_not = std::string(excluded ? "excluded" : interp::DescribeStatus(truth.status[k]))});
   }
   return sites;
 }

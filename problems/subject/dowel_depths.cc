@@ -312,10 +312,14 @@ void SetDepths(const TissueOptions& options, const LandmarkFile& landmarks,
 void EraseWithoutDepth(const FillNotes& notes, std::vector<Dowel>& dowels) {
   std::erase_if(dowels, [](const Dowel& dowel) { return std::isnan(dowel.depth_mm); });
   if (dowels.empty()) {
-    throw InputError(
-        fmt::format("no dowel has a tissue depth ({}); measure at least one in the landmark file, "
-                    "or name a table that has one of these sites",
-                    fmt::join(notes.Lines(), "; ")));
+    constexpr std::size_t kNamed = 3;
+    const std::vector<std::string>& lines = notes.Lines();
+    const std::size_t named = std::min(kNamed, lines.size());
+    throw InputError(fmt::format(
+        "no dowel has a tissue depth ({}{}); measure at least one in the landmark file, name a "
+        "table that has one of these sites, or write `depths: skin` if the true skin is known",
+        fmt::join(lines.begin(), lines.begin() + named, "; "),
+        lines.size() > named ? fmt::format("; and {} more", lines.size() - named) : ""));
   }
 }
 

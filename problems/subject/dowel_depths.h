@@ -20,10 +20,11 @@
 
 namespace semblance::problems {
 
-enum class DepthSource { kTable, kMeasured };
+// kMeasured: depths in the landmark file. kSkin: measured on the subject's true skin.
+enum class DepthSource { kTable, kMeasured, kSkin };
 
 constexpr auto EnumNames(DepthSource) {
-  return std::to_array<std::string_view>({"table", "measured"});
+  return std::to_array<std::string_view>({"table", "measured", "skin"});
 }
 
 // A model of the correlation of depths over people, for tables without correlations. The
@@ -146,12 +147,17 @@ struct TissueOptions {
   std::map<std::string, double> set_mm;
   TissueGiven given;
   std::vector<DepthBound> bounds;
+
+  // Returns whether the depths are this person's own, not those of a table.
+  bool AreMeasured() const { return depths != DepthSource::kTable; }
 };
 
 template <class Visitor>
 void Fields(Visitor& visit, TissueOptions& o) {
   visit(FieldInfo{.name = "depths",
-                  .doc = "table: depths of a population; measured: depths in the landmark file"},
+                  .doc = "table: depths of a population; measured: depths in the landmark file; "
+                         "skin: those to the subject's true skin, along the bone's normal at "
+                         "each landmark (depth_truth), in place of the file's"},
         o.depths);
   visit(FieldInfo{.name = "table",
                   .doc = "file of the tissue table; needed for depths: table, and for a scheme "
@@ -196,7 +202,7 @@ void Fields(Visitor& visit, TissueOptions& o) {
 }
 template <class Report>
 void CheckValue(Report& report, const TissueOptions& o) {
-  if (o.depths == DepthSource::kMeasured && !o.given.HasNothing()) {
+  if (o.AreMeasured() && !o.given.HasNothing()) {
     report("given",
            "applies to the depths of a table; write `depths: table`, and list the measured sites "
            "to use under given.measured");

@@ -26,6 +26,8 @@ def make_head(program, folder, head):
     head.mkdir(parents=True)
     for name, source in (("skull.ply", "import/skull.ply"), ("skin.ply", "import/skin.ply"), ("landmarks.yaml", "phantom/landmarks.yaml")):
         shutil.copy(folder / source, head / name)
+    lines = (head / "landmarks.yaml").read_text().splitlines(keepends=True)
+    (head / "landmarks.yaml").write_text("".join(line for line in lines if "depth_" not in line))  # a folder need not state depths
 
 
 def main():
