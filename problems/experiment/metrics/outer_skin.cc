@@ -46,20 +46,15 @@ class ProbeGrid {
 
   // Moves the ball in from all free faces of the box.
   void Flood() {
-    std::vector<GridCell> open;
+    std::vector<Run> open;
     ForFaces([&](const GridCell& c) { Enter(c, open); });
     while (!open.empty()) {
-      const GridCell c = open.back();
+      const Run run = open.back();
       open.pop_back();
-      for (int axis = 0; axis < 3; ++axis) {
-        for (const int step : {-1, 1}) {
-          GridCell next = c;
-          next[axis] += step;
-          if (next[axis] >= 0 && next[axis] < size_[axis]) {
-            Enter(next, open);
-          }
-        }
-      }
+      EnterBeside(run, run.y - 1, run.z, open);
+      EnterBeside(run, run.y + 1, run.z, open);
+      EnterBeside(run, run.y, run.z - 1, open);
+      EnterBeside(run, run.y, run.z + 1, open);
     }
   }
 
@@ -85,6 +80,11 @@ class ProbeGrid {
   enum State : std::uint8_t { kFree, kBarred, kReached };
   static constexpr int kCellsPerProbe = 6;
 
+  // Cells first..last of a row along x. Runs keep the flood's stack short and its memory close.
+  struct Run {
+    int first, last, y, z;
+  };
+
   std::size_t IndexOf(const GridCell& c) const {
     return (std::size_t(c[2]) * size_[1] + c[1]) * size_[0] + c[0];
   }
@@ -101,11 +101,32 @@ class ProbeGrid {
   Vec3 Middle(const GridCell& c) const {
     return origin_ + cell_mm_ * Vec3(c[0] + 0.5, c[1] + 0.5, c[2] + 0.5);
   }
-  void Enter(const GridCell& c, std::vector<GridCell>& open) {
-    std::uint8_t& state = state_[IndexOf(c)];
-    if (state == kFree) {
-      state = kReached;
-      open.push_back(c);
+  // Reaches a free cell, and the free cells that continue it along x.
+  void Enter(const GridCell& c, std::vector<Run>& open) {
+    std::uint8_t* const row = &state_[IndexOf({0, c[1], c[2]})];
+    if (row[c[0]] != kFree) {
+      return;
+    }
+    Run run{c[0], c[0], c[1], c[2]};
+    while (run.first > 0 && row[run.first - 1] == kFree) {
+      --run.first;
+    }
+    while (run.last + 1 < size_[0] && row[run.last + 1] == kFree) {
+      ++run.last;
+    }
+    std::fill(row + run.first, row + run.last + 1, kReached);
+    open.push_back(run);
+  }
+  // Enters the cells of another row that lie beside the run.
+  void EnterBeside(const Run& run, int y, int z, std::vector<Run>& open) {
+    if (y < 0 || y >= size_[1] || z < 0 || z >= size_[2]) {
+      return;
+    }
+    const std::uint8_t* const row = &state_[IndexOf({0, y, z})];
+    for (int x = run.first; x <= run.last; ++x) {
+      if (row[x] == kFree) {
+        Enter({x, y, z}, open);
+      }
     }
   }
   void CloseBeyond(const CutPlane& end) {
