@@ -11,6 +11,7 @@
 #include <numbers>
 #include <optional>
 
+#include "fitting/least_squares/sparse_factor.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/correspondences.h"
 
@@ -185,6 +186,7 @@ class SpringRound {
   }
 
   ceres::Solver::Summary Solve() {
+    UseOneLibraryThread();
     ceres::Solver::Options options;
     options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
     options.num_threads = 1;

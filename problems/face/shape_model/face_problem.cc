@@ -17,6 +17,8 @@
 #include <ranges>
 #include <utility>
 
+#include "fitting/least_squares/sparse_factor.h"
+
 namespace semblance::problems {
 namespace {
 
@@ -270,6 +272,7 @@ FaceProblemSummary FaceProblem::Solve(const FaceProblemOptions& options) {
       blocks_->problem.SetParameterBlockConstant(block);
     }
   }
+  fitting::UseOneLibraryThread();
   ceres::Solver::Options solver;
   solver.linear_solver_type =
       blocks_->vertices.empty() ? ceres::DENSE_NORMAL_CHOLESKY : ceres::SPARSE_NORMAL_CHOLESKY;
