@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The tables of commands. Each is defined in a separate file, e.g. FaceCommands in
-// face_commands.cc; main.cc declares all of them.
+// face_commands.cc; program.cc declares all of them.
 #pragma once
 
 #include <span>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// An empty folder for one test, which is removed afterwards.
+// An empty folder for one test, or with an ending of its own for several; it is removed afterwards.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -14,10 +14,10 @@ using namespace problems;
 
 class ScratchFolder {
  public:
-  ScratchFolder() {
+  explicit ScratchFolder(const std::string& ending = "") {
     const auto* info = ::testing::UnitTest::GetInstance()->current_test_info();
     std::string name = std::string(info->test_suite_name()) + "_" + info->name() + "_" +
-                       std::to_string(::getpid());
+                       std::to_string(::getpid()) + ending;
     std::replace(name.begin(), name.end(), '/', '_');
     path_ = std::filesystem::path(::testing::TempDir()) / name;
     std::filesystem::remove_all(path_);
