@@ -214,9 +214,10 @@ TEST(ExtraDowels, WithoutSeedsTheFitHasTheDowelsAlone) {
 }
 
 TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeld) {
-  const std::vector<std::string> quick = {"seeds.level=1"};
+  const std::vector<std::string> quick = {"seeds.level=1", "uncertainty.sigma=false"};
+  StageCache cache(8);
   const auto uv_of = [&](const std::string& sites) {
-    const RunResult result = problems::Run(Phantom30(sites, quick), {});
+    const RunResult result = problems::Run(Phantom30(sites, quick), {}, &cache);
     for (std::size_t k = 0; k < result.target.points.size(); ++k) {
       if (result.target.points[k].label == "go_l") {
         return result.fit.uv[k];

@@ -51,8 +51,13 @@ double DistanceOfTips_mm(const RunResult& result) {
   return std::sqrt(squares / static_cast<double>(result.subject.dowels_on_bone.size()));
 }
 
+const RunResult& SpringRun() {
+  static const RunResult run = RunSpringPhantom("springs");
+  return run;
+}
+
 TEST(SpringFace, TheNetComesToTheDepthAndStaysAtTheTips) {
-  const RunResult springs = RunSpringPhantom("springs");
+  const RunResult& springs = SpringRun();
   const RunResult start = RunSpringPhantom("{type: thin_plate, stiffness_mm: 0}");
   ASSERT_TRUE(springs.usable());
   EXPECT_LT(MedianFromImplicit_mm(springs), 0.7 * MedianFromImplicit_mm(start));
@@ -68,7 +73,7 @@ TEST(SpringFace, TheNetComesToTheDepthAndStaysAtTheTips) {
 }
 
 TEST(SpringFace, TheNumberOfThreadsChangesNoByte) {
-  const RunResult one = RunSpringPhantom("springs"), three = RunSpringPhantom("springs", 3);
+  const RunResult &one = SpringRun(), three = RunSpringPhantom("springs", 3);
   EXPECT_EQ(one.fit.surface.Offsets(), three.fit.surface.Offsets());
   EXPECT_EQ(one.fit.surface.Net(0).vertices, three.fit.surface.Net(0).vertices);
 }

@@ -32,9 +32,15 @@ using testing::WordsOf;
 
 const std::string kBase = fmt::format(
     "base: {}/configs/phantom.yaml\n"
-    "set: {{subject.rings: 40, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
+    "set: {{subject.rings: 24, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
     "      fit.plan.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
     SEMBLANCE_SOURCE_DIR);
+
+const char* const kSmall =
+    "subjects:\n  - {name: a, set: {subject.random_seed: 1}}\n"
+    "  - {name: b, set: {subject.random_seed: 2}}\n"
+    "grid: {interp: [nearest, {type: mean}], fit.features: [restore]}\nmetric: "
+    "implicit_face.rms_mm\n";
 
 class StudyTest : public ::testing::Test {
  protected:
@@ -45,28 +51,27 @@ class StudyTest : public ::testing::Test {
   }
   StudyPlan Plan(const std::string& text) { return ReadStudy(Write(kBase + text)); }
 
+  // Puts a finished study of kSmall into the folder. Its trials run once per process.
+  void CopySmall(const std::string& folder) {
+    static const ScratchFolder done("_small");
+    if (!fs::exists(done / "run")) {
+      RunStudy(Plan(kSmall), done / "run", {}, {});
+    }
+    fs::copy(done / "run", folder_ / folder, fs::copy_options::recursive);
+  }
+
   ScratchFolder folder_;
 };
 
-const char* const kSmall =
-    "subjects:\n  - {name: a, set: {subject.random_seed: 1}}\n"
-    "  - {name: b, set: {subject.random_seed: 2}}\n"
-    "grid: {interp: [nearest, {type: mean}], fit.features: [restore]}\nmetric: "
-    "implicit_face.rms_mm\n";
-
 TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
   const StudyPlan plan = Plan(kSmall);
-  RunStudy(plan, folder_ / "one", {}, {});
+  CopySmall("one");
   const auto one = StudyFiles(folder_ / "one");
   EXPECT_THAT(one.at("trials.csv"), HasSubstr(",implicit_face.rms_mm,"));
 
-  RunStudy(plan, folder_ / "two", {.jobs = 2}, {});
-  EXPECT_EQ(StudyFiles(folder_ / "two"), one);
-
-  for (int shard = 0; shard < 3; ++shard) {
-    RunStudy(plan, folder_ / fmt::format("shard{}", shard), {.shard = shard, .shards = 3}, {});
-  }
-  GatherTrials(folder_ / "merged", {folder_ / "shard2", folder_ / "shard0", folder_ / "shard1"});
+  RunStudy(plan, folder_ / "shard0", {.jobs = 2, .shard = 0, .shards = 2}, {});
+  RunStudy(plan, folder_ / "shard1", {.shard = 1, .shards = 2}, {});
+  GatherTrials(folder_ / "merged", {folder_ / "shard1", folder_ / "shard0"});
   EXPECT_EQ(StudyFiles(folder_ / "merged"), one);
 
   // Simulates kill -9: one trial is missing, one is cut short.
@@ -80,7 +85,7 @@ TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
 
 // A changed study gives the same trials and tables as if it had never been different.
 TEST_F(StudyTest, AChangedStudyKeepsItsTrialsAndGivesTheSameTables) {
-  RunStudy(Plan(kSmall), folder_ / "run", {}, {});
+  CopySmall("run");
   const StudyPlan changed = Plan(
       "subjects:\n  - {name: b, set: {subject.random_seed: 2}}\n"
       "  - {name: c, set: {subject.random_seed: 3}}\n"
@@ -172,9 +177,9 @@ TEST_F(StudyTest, DamagedTrialsRunAgain) {
 // A sound trial of another folder replaces a damaged one; a damaged one is never taken.
 TEST_F(StudyTest, AMergeReplacesDamagedTrialsAndTakesNone) {
   const StudyPlan plan = Plan(kSmall);
-  RunStudy(plan, folder_ / "whole", {.jobs = 2}, {});
+  CopySmall("whole");
   const auto whole = StudyFiles(folder_ / "whole");
-  fs::copy(folder_ / "whole", folder_ / "damaged", fs::copy_options::recursive);
+  CopySmall("damaged");
   const fs::path file = folder_ / "damaged/trials" / plan.trials[0].id / "trial.json";
   std::string text = ReadFileBytes(file);
   text[text.find("rms_mm") + 12] ^= 1;
@@ -188,7 +193,7 @@ TEST_F(StudyTest, AMergeReplacesDamagedTrialsAndTakesNone) {
 
 TEST_F(StudyTest, TrialsOfAnotherVersionAreNamedAndCanRunAgain) {
   const StudyPlan plan = Plan(kSmall);
-  RunStudy(plan, folder_ / "run", {.jobs = 2}, {});
+  CopySmall("run");
   const auto own = StudyFiles(folder_ / "run");
   EXPECT_THAT(VersionNotes(ReadStudyResults(folder_ / "run")), ::testing::IsEmpty());
   for (int n = 0; n < 3; ++n) {
@@ -205,7 +210,7 @@ TEST_F(StudyTest, TrialsOfAnotherVersionAreNamedAndCanRunAgain) {
   EXPECT_THAT(StudyFiles(folder_ / "run").at("report.html"), HasSubstr(words));
   GatherTrials(folder_ / "merged", {folder_ / "run"});
   EXPECT_THAT(StudyFiles(folder_ / "merged").at("report.html"), HasSubstr(words));
-  RunStudy(plan, folder_ / "new", {.jobs = 2}, {});
+  CopySmall("new");
   EXPECT_THAT(CompareStudies(ReadStudies({folder_ / "run", folder_ / "new"}), {}).notes,
               ::testing::Contains(HasSubstr(words)));
   EXPECT_EQ(RunStudy(plan, folder_ / "run", {.jobs = 2, .rerun = Rerun::kOtherVersions}, {}).done,
@@ -236,7 +241,7 @@ TEST_F(StudyTest, OnlySelectedTrialsRunAndTheOthersCanFollow) {
   EXPECT_EQ(RunStudy(plan, folder_ / "run", {.rerun = Rerun::kAll, .only = "subject = b"}, {}).done,
             2);
   EXPECT_EQ(RunStudy(plan, folder_ / "run", {}, {}).done, 2);
-  RunStudy(plan, folder_ / "whole", {}, {});
+  CopySmall("whole");
   EXPECT_EQ(StudyFiles(folder_ / "run"), StudyFiles(folder_ / "whole"));
   EXPECT_THAT(
       WordsOf<InputError>([&] { RunStudy(plan, folder_ / "none", {.only = "subject = x"}, {}); }),
@@ -338,7 +343,7 @@ TEST_F(StudyTest, AFolderOfAnotherPlanIsLeftAlone) {
 
 TEST_F(StudyTest, ResultsEqualThoseOfSingleRuns) {
   const StudyPlan plan = Plan(kSmall);
-  RunStudy(plan, folder_ / "run", {.jobs = 2}, {});
+  CopySmall("run");
   const StudyResults results = ReadStudyResults(folder_ / "run");
   for (std::size_t n = 0; n < plan.trials.size(); ++n) {
     const RunResult alone = problems::Run(plan.trials[n].experiment, {});

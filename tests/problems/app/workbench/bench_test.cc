@@ -50,6 +50,10 @@ class WorkbenchBench : public ::testing::Test {
     options.folder = folder_ / "bench";
     return options;
   }
+  // A run without a true skin has nothing to score, and fewer pictures.
+  static void RemoveSkin(Bench& bench) {
+    bench.Apply("no skin", [](BenchState s) { return ChangeSetting(s, "subject.skin", "\"\""); });
+  }
   static void RunUntilEnd(Bench& bench) {
     bench.StartRun();
     AwaitEnd(bench);
@@ -148,7 +152,7 @@ void ExpectOwnFeatureChangesNothing(Bench& bench) {
 // The test of the page (workbench_page.py) compares every byte of the folder.
 TEST_F(WorkbenchBench, ARunOfTheFolderGivesTheSameFaceWithItsEdits) {
   Bench bench(Options());
-  bench.Apply("no skin", [](BenchState s) { return ChangeSetting(s, "subject.skin", "\"\""); });
+  RemoveSkin(bench);
   bench.Apply("set a depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.g", "9"); });
   bench.Apply("edited", [](BenchState s) {
     EditScript script;
@@ -190,6 +194,7 @@ void Touch(const fs::path& file) { WriteFileAtomically(file, ReadFileBytes(file)
 // workbenches.
 TEST_F(WorkbenchBench, NotesMakeTheReportStaleButNotTheFace) {
   Bench bench(Options());
+  RemoveSkin(bench);
   RunUntilEnd(bench);
   bench.Apply("note", [](BenchState s) { return ChangeSetting(s, "record.notes", "\"found\""); });
   EXPECT_TRUE(bench.TakeSnapshot().face_fresh);
@@ -211,6 +216,7 @@ TEST_F(WorkbenchBench, AFileThatChangesOnTheDiskMakesTheFaceStale) {
   };
   {
     Bench bench(Options());
+    RemoveSkin(bench);
     bench.Apply("depths", set("tissue.depths", "\"table\""));
     bench.Apply("table", set("tissue.table", "\"tables/rhine_caucasoid.yaml\""));
     RunUntilEnd(bench);
@@ -244,6 +250,7 @@ TEST_F(WorkbenchBench, AFileThatChangesOnTheDiskMakesTheFaceStale) {
 // The second run must not use intermediate results of the former contents.
 TEST_F(WorkbenchBench, ARunAfterAChangeOfAFileIsThatOfTheChangedFile) {
   Bench bench(Options());
+  RemoveSkin(bench);
   RunUntilEnd(bench);
   const HSplineSurface before = bench.Full().surface;
   Scale(bench.Folder() / "subject/skull.ply", 1.003);
@@ -259,6 +266,7 @@ TEST_F(WorkbenchBench, ASkullThatNoLongerFitsOrCannotBeReadStillOpens) {
   const fs::path skull = folder_ / "bench/subject/skull.ply";
   {
     Bench bench(Options());
+    RemoveSkin(bench);
     RunUntilEnd(bench);
   }
   Scale(skull, 1.1);
@@ -295,6 +303,7 @@ TEST_F(WorkbenchBench, AChangeDuringARunDiscardsItsResult) {
 // As two pages do at the same moment.
 TEST_F(WorkbenchBench, ManyThreadsMayStartAJobAtOnce) {
   Bench bench(Options());
+  RemoveSkin(bench);
   for (int round = 0; round < 2; ++round) {
     std::vector<std::jthread> pages;
     for (int k = 0; k < 3; ++k) {
@@ -376,6 +385,7 @@ TEST_F(WorkbenchBench, AFullVariantIsTheRunOfItsBuild) {
   };
   {
     Bench bench(Options());
+    RemoveSkin(bench);
     bench.Apply("depths", set("tissue.depths", "\"table\""));
     bench.Apply("table", set("tissue.table", "\"tables/rhine_caucasoid.yaml\""));
     EXPECT_THROW(bench.FullVariant(BenchVariant::kObese), InputError);
@@ -400,7 +410,7 @@ TEST_F(WorkbenchBench, AFullVariantIsTheRunOfItsBuild) {
 
 TEST_F(WorkbenchBench, ThePreviewOfAPullPredictsItsResult) {
   Bench bench(Options());
-  bench.Apply("no skin", [](BenchState s) { return ChangeSetting(s, "subject.skin", "\"\""); });
+  RemoveSkin(bench);
   Pull pull{.level = 1, .reach = 2, .mirror = true};
   EXPECT_THROW(bench.PullMovesAt({0, -100, 0}, pull), InputError);
   RunUntilEnd(bench);

@@ -88,12 +88,12 @@ TEST(FeaturePoints, TheNoseTipMovesWithTheFace) {
   EXPECT_TRUE(MeasureFeaturePoints(truth, receding, sites).empty());
 }
 
-double StrainOfFeatures(const std::string& rule) {
+double StrainOfFeatures(const std::string& rule, StageCache& cache) {
   const auto config = std::filesystem::path(SEMBLANCE_SOURCE_DIR) / "configs/phantom.yaml";
-  const std::vector<std::string> overrides = {"subject.rings=40", "implicit.resolution=48",
-                                              "uncertainty.sigma=false",
+  const std::vector<std::string> overrides = {"subject.rings=30", "implicit.resolution=36",
+                                              "seeds.level=1", "uncertainty.sigma=false",
                                               fmt::format("fit.features={}", rule)};
-  const RunResult result = Run(ReadConfig<Experiment>(config, overrides), {});
+  const RunResult result = Run(ReadConfig<Experiment>(config, overrides), {}, &cache);
   const FeatureDistortion& all = *(result.features.end() - 2);
   EXPECT_EQ(all.part, "features");
   return all.distortion.rms_strain;
@@ -103,8 +103,10 @@ double StrainOfFeatures(const std::string& rule) {
 // Their finer vertices undo some of that, the less the more they are held
 // (docs/explanation/fit.md).
 TEST(FeatureDistortion, TheMoreTheirOffsetsAreHeldTheMoreFeaturesAreStrained) {
-  const double free = StrainOfFeatures("free"), weighted = StrainOfFeatures("weighted"),
-               frozen = StrainOfFeatures("frozen"), restored = StrainOfFeatures("restore");
+  StageCache cache(8);
+  const auto strain = [&](const char* rule) { return StrainOfFeatures(rule, cache); };
+  const double free = strain("free"), weighted = strain("weighted"), frozen = strain("frozen"),
+               restored = strain("restore");
   EXPECT_LT(free, weighted);
   EXPECT_LT(weighted, frozen);
   EXPECT_LT(frozen, restored);
