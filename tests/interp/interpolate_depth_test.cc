@@ -189,10 +189,10 @@ TEST_P(EveryScheme, WorksWithTwoHundredDowels) {
 }
 
 // More dowels than vertices, several in each triangle.
-TEST_P(EveryScheme, WorksWithTwoThousandDowels) {
-  constexpr int kDowels = 2000;
+TEST_P(EveryScheme, WorksWithAThousandDowels) {
+  constexpr int kDowels = 1000;
   DowelScene scene;
-  scene.skull = testing::SphereMesh({0, 0, 0}, 90, 16);
+  scene.skull = testing::SphereMesh({0, 0, 0}, 90, 11);
   scene.normals = VertexNormals(scene.skull);
   Random random(3);
   for (int k = 0; k < kDowels; ++k) {
@@ -207,7 +207,7 @@ TEST_P(EveryScheme, WorksWithTwoThousandDowels) {
     scene.network.areas.push_back({k, k + 1, k + 2});
   }
   const DepthField field = FieldOf(scene);
-  EXPECT_GT(Count(field, DepthStatus::kAssigned), 50);
+  EXPECT_GT(Count(field, DepthStatus::kAssigned), 25);
   const auto [least, most] =
       std::ranges::minmax(scene.dowels, {}, [](const Dowel& dowel) { return dowel.depth_mm; });
   for (std::size_t i = 0; i < field.status.size(); ++i) {

@@ -267,7 +267,7 @@ TrueDepths TrueDepthsAt(const std::vector<Phantom>& phantoms, const std::string&
 // Errors that all heads share do not average out, so each site has its own limit: chords of such a
 // coarse mesh are off by 0.1 mm where bone and skin curve most (me), in all heads alike.
 TEST(AnalysePopulation, OfManyPhantomsHasTheTrueMeansAndDeviations) {
-  constexpr int kMany = 100;  // small ones: some 50 ms each
+  constexpr int kMany = 40;  // small ones: some 50 ms each
   constexpr double kChord_mm = 0.12, kScatter_mm = 0.03, kShare = 0.02;
   const ScratchFolder folder;
   WriteFileAtomically(folder / "many.yaml",
