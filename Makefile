@@ -9,7 +9,7 @@ PROGRAM      := $(BUILD)/problems/semblance
 DEMO_OUT     ?= out/demo
 BASE         ?= HEAD~1
 
-.PHONY: all setup configure build demo demo-phantom deb site thesis heads test harness bench profile same-bytes clang-numbers sanitize races coverage \
+.PHONY: all setup configure build demo demo-phantom deb site thesis heads test test-all harness bench profile same-bytes clang-numbers sanitize races coverage \
   format check headers tidy configs clean
 
 all: build
@@ -83,8 +83,12 @@ heads: configure
 	@cmake --build --preset quick --target semblance
 	@/usr/bin/python3 -B docs/heads.py build-quick/problems/semblance $(HEADS) out/heads $(if $(ONLY),--only "$(ONLY)",--page docs/experiments/heads.md)
 
+# The everyday tests: all but those with the labels documents (commands and figures of the documents) and packaging.
 test: build
 	@ctest --preset $(PRESET) -j "$$(nproc)"
+
+test-all: build
+	@ctest --preset all -j "$$(nproc)"
 
 # Hostile calls, injected faults, pairs of options, fuzzing. ONLY selects some of: attack faults pairwise fuzz (docs/explanation/reliability.md).
 # SEED, LAWS, COUNT, PAIRS, SHARE and MINUTES set how much of each.
