@@ -36,7 +36,7 @@ using testing::ScratchFolder;
 const std::string kProgram = SEMBLANCE_PROGRAM;
 const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs";
 const std::string kQuick =
-    " --quiet --set subject.rings=30 --set implicit.resolution=40 --set seeds.level=1";
+    " --quiet --set subject.rings=24 --set implicit.resolution=24 --set face=placed";
 
 class CommandLine : public ::testing::Test {
  protected:

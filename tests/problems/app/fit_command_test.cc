@@ -446,7 +446,8 @@ TEST_F(FitCommand, ATubeIsFittedByEveryPlan) {
       {"footpoint", {level_2, "fit.relaxation=footpoint"}},
       {"joint", {level_2, "fit.relaxation={type: joint, rounds: 1}"}}};
   for (const auto& [name, settings] : ways) {
-    std::string call = "fit head.csv --quiet --set closure=periodic_u --set chord_mm=0.02";
+    std::string call =
+        "fit head.csv --quiet --set closure=periodic_u --set chord_mm=0.02 --set report=false";
     for (const std::string& setting : settings) {
       call += fmt::format(" --set '{}'", setting);
     }

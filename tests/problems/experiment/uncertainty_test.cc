@@ -38,7 +38,7 @@ double MedianSigma(const RunResult& result) { return result.uncertainty->median_
 // area.
 TEST(Uncertainty, NinetyPercentIntervalsHoldNineTenthsOfThePhantomsFaces) {
   double share = 0, area = 0;
-  for (const int random_seed : {1, 2, 3}) {
+  for (const int random_seed : {1, 2}) {
     const RunResult& result = RunPhantom({fmt::format("subject.random_seed={}", random_seed)});
     ASSERT_TRUE(result.truth);
     const SigmaCoverage& sigma = result.truth->sigma;
@@ -46,7 +46,7 @@ TEST(Uncertainty, NinetyPercentIntervalsHoldNineTenthsOfThePhantomsFaces) {
     share += sigma.at_90 * sigma.area_cm2;
     area += sigma.area_cm2;
   }
-  EXPECT_GT(area, 3 * 150);
+  EXPECT_GT(area, 2 * 150);
   EXPECT_GT(share / area, 0.85);
   EXPECT_LT(share / area, 0.95);
 }
