@@ -19,7 +19,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-constexpr int kRings = 60;
+constexpr int kRings = 45;
 
 Phantom PhantomOf(std::uint64_t random_seed) {
   return MakePhantom({.random_seed = random_seed, .rings = kRings});
