@@ -224,6 +224,7 @@ class Proposer {
     }
     ProposedSite found{.site = site,
                        .point = point,
+                       .direction = SuggestedDirection(point, outward, {skull_, bone_, ends_}),
                        .predicted = predicted,
                        .references = predictions.references,
                        .predictions = static_cast<int>(predictions.points.size()),
@@ -376,6 +377,7 @@ LandmarkFile ProposalFile(const Proposal& proposal, const std::string& subject) 
     Landmark landmark;
     landmark.site = site.site;
     landmark.MoveTo(site.point);
+    landmark.normal = {site.direction.x(), site.direction.y(), site.direction.z()};
     landmark.certainty = GradeCertainty(site);
     landmark.doubt_mm = site.expected_error_mm;
     landmark.note = ExplainConfidence(site);

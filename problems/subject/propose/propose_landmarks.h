@@ -19,6 +19,7 @@ namespace semblance::problems {
 struct ProposedSite {
   std::string site;
   Vec3 point = Vec3::Constant(kNaN);      // on the skull, mm
+  Vec3 direction = Vec3::Constant(kNaN);  // of its depth marker (SuggestedDirection)
   Vec3 predicted = Vec3::Constant(kNaN);  // median of the references, before the rule is applied
   int references = 0;                     // heads that have the site, without mirror images
   int predictions = 0;                    // the same with mirror images

@@ -18,6 +18,11 @@ std::vector<Vec3> BorderPoints(const TriMesh& mesh) {
   return points;
 }
 
+Vec3 BoneDirection(const Vec3& point, const SuggestedBone& bone) {
+  constexpr double kRadius_mm = 3;  // as a depth marker's direction (PlaceOptions)
+  return AveragedNormal(bone.mesh, bone.query.Closest(point).triangle, {point, kRadius_mm});
+}
+
 }  // namespace
 
 SurfaceEnds::SurfaceEnds(const TriMesh& skull) : lids_(FindLids(skull)) {
@@ -34,7 +39,6 @@ bool SurfaceEnds::IsNear(const Vec3& point, double distance_mm) const {
 }
 
 std::string SuggestionFault(const Vec3& point, const Vec3& outward, const SuggestedBone& bone) {
-  constexpr double kRadius_mm = 3;    // as a depth marker's direction (PlaceOptions)
   constexpr double kEnd_mm = 2;       // more would drop menton where a scan ends just below it
   constexpr double kLeave_mm = 1;     // beyond the roughness of the bone at the point itself
   constexpr double kCovered_mm = 20;  // a deep frontal sinus; the arch is farther from the ramus
@@ -42,8 +46,7 @@ std::string SuggestionFault(const Vec3& point, const Vec3& outward, const Sugges
   if (bone.ends.IsNear(point, kEnd_mm)) {
     return "the bone ends there: the scan is cut, or the surface is broken";
   }
-  const int triangle = bone.query.Closest(point).triangle;
-  const Vec3 direction = AveragedNormal(bone.mesh, triangle, {point, kRadius_mm});
+  const Vec3 direction = BoneDirection(point, bone);
   if (!(direction.dot(outward) > kMinCosine)) {
     return "the bone found there faces another way than this site's";
   }
@@ -51,6 +54,10 @@ std::string SuggestionFault(const Vec3& point, const Vec3& outward, const Sugges
     return "the bone found there lies under other bone";
   }
   return "";
+}
+
+Vec3 SuggestedDirection(const Vec3& point, const Vec3& outward, const SuggestedBone& bone) {
+  return (BoneDirection(point, bone) + outward).normalized();
 }
 
 std::optional<Vec3> FindOuterPoint(const Vec3& predicted, const Vec3& outward,

@@ -73,6 +73,26 @@ TEST(ProposeLandmarks, FindsTheSitesOfAMovedAndScaledHead) {
   EXPECT_LT(found.most_mm, 10);
 }
 
+TEST(ProposeLandmarks, MarkersPointOutwardsInTheFrameOfTheSkull) {
+  const Phantom phantom = PhantomOf(4);
+  const std::vector<ReferenceHead> references = OneReference();
+  const Similarity pose = {.scale = 1,
+                           .rotation = Eigen::AngleAxisd(2.1, Vec3::UnitZ()).toRotationMatrix()};
+  const LandmarkFile file = ProposalFile(
+      ProposeLandmarks(Transformed(phantom.skull, pose), "skull.ply", references, {}), "head");
+  Vec3 middle = Vec3::Zero();
+  for (const PhantomSite& s : phantom.sites) {
+    middle += pose * s.base / static_cast<double>(phantom.sites.size());
+  }
+  ASSERT_FALSE(file.landmarks.empty());
+  for (const Landmark& l : file.landmarks) {
+    ASSERT_TRUE(l.normal) << l.site;
+    const Vec3 direction(l.normal->data());
+    EXPECT_NEAR(direction.norm(), 1, 1e-9) << l.site;
+    EXPECT_GT(direction.dot(l.Position() - middle), 0) << l.site;
+  }
+}
+
 TEST(ProposeLandmarks, DoesNotDependOnThreads) {
   const TriMesh skull = PhantomOf(4).skull;
   const std::vector<ReferenceHead> references = OneReference();

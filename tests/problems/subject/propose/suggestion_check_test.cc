@@ -59,6 +59,15 @@ TEST_F(Vault, BoneUnderBoneIsNotSuggested) {
   EXPECT_EQ(SuggestionFault(80 * front, front, {layers, query, ends}), "");
 }
 
+TEST_F(Vault, AMarkerPointsHalfwayBetweenTheBonesDirectionAndTheSites) {
+  const Vec3 bone(0, -1, 0), site = Vec3(0.6, -0.8, 0);
+  const Vec3 found =
+      SuggestedDirection(query_.Closest(80 * bone).position, site, {mesh_, query_, ends_});
+  EXPECT_NEAR(found.norm(), 1, 1e-12);
+  EXPECT_NEAR(found.dot(bone), found.dot(site), 0.01);
+  EXPECT_NEAR(found.cross(bone).normalized().dot(site), 0, 0.05) << "in the plane of the two";
+}
+
 TEST_F(Vault, TheEndOfTheSurfaceIsNotSuggested) {
   const Vec3 at_the_cut = Vec3(std::sqrt(80.0 * 80 - 39 * 39), 39, 0) / 80;
   EXPECT_THAT(Fault(at_the_cut, 80), HasSubstr("the bone ends there"));
