@@ -14,7 +14,7 @@ import mutations
 REQUESTS = 260
 ACTIONS = [
     {"do": "place", "site": "g", "origin": [0, -300, 0], "direction": [0, 1, 0], "near": [0, -90, 0]}, {"do": "remove", "site": "g"},
-    {"do": "rename", "site": "g", "name": "n"}, {"do": "absent", "site": "g", "reason": "x"}, {"do": "confirm", "site": "g"}, {"do": "confirm_all"},
+    {"do": "rename", "site": "g", "name": "n"}, {"do": "absent", "site": "g", "reason": "x"}, {"do": "confirm", "site": "g"}, {"do": "confirm_all"}, {"do": "leave_out_doubtful"},
     {"do": "remark", "site": "g", "certainty": "low", "note": "x", "depth_mm": 5}, {"do": "set", "path": "tissue.set_mm.g", "value": 5},
     {"do": "set", "path": "interp", "value": "nearest"}, {"do": "unset", "path": "interp"}, {"do": "pull", "at": [0, -90, 0], "by": [0, -1, 0], "level": 1, "reach": 1.0, "mirror": False},
     {"do": "clear_edits"}, {"do": "keep_feature", "part": "nose", "name": "a"}, {"do": "blend_feature", "name": "a", "weight": 0.5}, {"do": "undo"}, {"do": "redo"},

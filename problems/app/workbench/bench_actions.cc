@@ -172,6 +172,16 @@ BenchState ConfirmAllLandmarks(BenchState state) {
   return state;
 }
 
+BenchState LeaveOutDoubtfulLandmarks(BenchState state) {
+  const std::vector<BenchLandmark> landmarks = state.landmarks;
+  for (const BenchLandmark& landmark : landmarks) {
+    if (landmark.IsDoubtful()) {
+      state = MarkAbsent(std::move(state), landmark.site, "the proposed point was doubtful");
+    }
+  }
+  return ConfirmAllLandmarks(std::move(state));
+}
+
 BenchState ReplaceLandmarks(BenchState state, const LandmarkFile& file) {
   state.landmarks.clear();
   state.absent.clear();

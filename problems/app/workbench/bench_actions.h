@@ -50,6 +50,10 @@ BenchState RemarkLandmark(BenchState state, const std::string& site,
 BenchState ConfirmLandmark(BenchState state, const std::string& site);
 BenchState ConfirmAllLandmarks(BenchState state);
 
+// Marks the doubtful proposed landmarks as absent and confirms the others. A site without a depth
+// marker costs the face less than a marker at a wrong place.
+BenchState LeaveOutDoubtfulLandmarks(BenchState state);
+
 // Replaces all landmarks by those of a file. If it is marked as proposed, those with a doubt count
 // as proposed, or all of them if none has a doubt.
 BenchState ReplaceLandmarks(BenchState state, const LandmarkFile& file);

@@ -339,6 +339,10 @@ void Confirm(Bench& bench, const Json& json) {
 void ConfirmAll(Bench& bench, const Json&) {
   bench.Apply("confirmed all", [](BenchState s) { return ConfirmAllLandmarks(std::move(s)); });
 }
+void LeaveOutDoubtful(Bench& bench, const Json&) {
+  bench.Apply("left out the doubtful landmarks",
+              [](BenchState s) { return LeaveOutDoubtfulLandmarks(std::move(s)); });
+}
 void ClearLandmarks(Bench& bench, const Json&) {
   bench.Apply("removed all landmarks",
               [](BenchState s) { return ReplaceLandmarks(std::move(s), {}); });
@@ -423,7 +427,7 @@ void RunFace(Bench& bench, const Json&) { bench.StartRun(); }
 void ProposeSites(Bench& bench, const Json&) { bench.StartProposal(); }
 void Cancel(Bench& bench, const Json&) { bench.CancelJob(); }
 
-constexpr std::array<std::pair<std::string_view, Action>, 26> kActions = {
+constexpr std::array<std::pair<std::string_view, Action>, 27> kActions = {
     {{"place", &Place},
      {"turn", &Turn},
      {"remove", &Remove},
@@ -432,6 +436,7 @@ constexpr std::array<std::pair<std::string_view, Action>, 26> kActions = {
      {"remark", &Remark},
      {"confirm", &Confirm},
      {"confirm_all", &ConfirmAll},
+     {"leave_out_doubtful", &LeaveOutDoubtful},
      {"clear_landmarks", &ClearLandmarks},
      {"set", &Set},
      {"unset", &Unset},

@@ -112,6 +112,18 @@ TEST(BenchActions, AllAreConfirmedOnlyAfterTheDoubtfulOnes) {
   EXPECT_FALSE(ToLandmarkFile(state).proposed);
 }
 
+TEST(BenchActions, DoubtfulProposalsAreLeftOutAndTheOthersConfirmed) {
+  BenchState state = LeaveOutDoubtfulLandmarks(ReplaceLandmarks({}, ProposedPoints(8)));
+  ASSERT_EQ(state.landmarks.size(), 1U);
+  EXPECT_EQ(state.landmarks[0].site, "g");
+  EXPECT_FALSE(state.landmarks[0].proposed);
+  ASSERT_EQ(state.absent.size(), 1U);
+  EXPECT_EQ(state.absent[0].site, "n");
+  state = LeaveOutDoubtfulLandmarks(
+      PlaceLandmark(ReplaceLandmarks({}, ProposedPoints(8)), "n", {1, 2, 3}));
+  EXPECT_EQ(state.landmarks.size(), 2U) << "a person's landmark has no doubt";
+}
+
 TEST(BenchActions, InAFileOfBothKindsOnlyPointsWithADoubtAreProposed) {
   const BenchState state = ReplaceLandmarks({}, ProposedPoints(std::nullopt));
   EXPECT_TRUE(state.landmarks[0].proposed);
