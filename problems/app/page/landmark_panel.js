@@ -129,7 +129,7 @@ function suggestion(state) {
 // One sentence that names the next step.
 function guide(state, proposed, doubtful) {
   const next = nextStep();
-  const text = proposed ? (doubtful ? `${doubtful} of the ${proposed} proposed points are doubtful: review them, the most doubtful first.`
+  const text = proposed ? (doubtful ? `${doubtful} of the ${proposed} proposed points are doubtful: review them, the most doubtful first, or leave them out.`
                                     : 'Look at the proposed points. If they are right, confirm all at once.')
       : confirmed(state) < 3 && next ? `Click on the bone at ${nameOf(next)} (${next}). After ${FIRST_CLICKS.map(nameOf).join(', ')} the program suggests the rest.`
       : confirmed(state) < standardSites().length ? 'Let the program suggest the other sites, or place them yourself.' : '';
@@ -161,6 +161,8 @@ export function landmarkPanel(bench) {
           .map(({site, point}) => ({site: null, point, hollow: true, colour: '#0b5c8f', text: `${site} may be here`}))]);
   };
 
+  const goOn = async (action) => { if (await act(action)) { bench.show('person'); } };
+
   const draw = () => {
     const state = store.state, placed = state.landmarks.filter(({site}) => siteOf(site).standard);
     const proposed = toReview().length, doubtful = toReview().filter((landmark) => landmark.doubtful).length;
@@ -171,8 +173,9 @@ export function landmarkPanel(bench) {
                    title: 'searches the other sites on the bone, from the points that you have placed'}),
             proposed ? button(`Review ${proposed}`, () => choose(toReview()[0].site),
                               {className: 'primary', title: 'the most doubtful first'}) : null,
-            proposed ? button('All are right', () => act('confirm_all'), {disabled: doubtful > 0,
-                              title: doubtful ? `first confirm or move the ${doubtful} doubtful ones` : ''}) : null),
+            proposed && !doubtful ? button('All are right', () => goOn('confirm_all'), {title: 'confirms them, and goes on to the person'}) : null,
+            doubtful ? button(`Leave out the ${doubtful} doubtful, keep the others`, () => goOn('leave_out_doubtful'),
+                              {title: 'marks the doubtful ones as absent, confirms the others, and goes on to the person'}) : null),
         guide(state, proposed, doubtful),
         lines(state.errors, 'bad') || '', lines(state.notes, 'soft') || '');
     about.replaceChildren(...detail(store.site, handle));
@@ -209,7 +212,10 @@ export function landmarkPanel(bench) {
     if (done && isNew && !stay) {
       const begun = FIRST_CLICKS.includes(site) && confirmed(store.state) === FIRST_CLICKS.length;  // the program can suggest the rest
       choose(nextStep() || (begun ? null : nextOpen(site)));
-      if (begun) { head.scrollIntoView({block: 'nearest'}); }
+      if (begun) {
+        head.scrollIntoView({block: 'nearest'});
+        await act('propose');
+      }
     }
     if (done && wasProposed && !stay && toReview().length) { choose(toReview()[0].site); }
   };

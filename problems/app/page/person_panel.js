@@ -2,7 +2,7 @@
 // The case and the person. The depths of the face depend on the table, the sex and the build, so the page asks for them
 // and assumes none.
 import {controlAt} from './controls.js';
-import {button, element, field, group, select} from './dom.js';
+import {button, check, element, field, group} from './dom.js';
 import {act, store} from './store.js';
 
 const PLAIN_TITLE = 'Facial approximation';  // of a case that began without a configuration; a configuration states the person
@@ -20,15 +20,13 @@ const missing = (state) => {
 // True if all facts that the depths depend on are stated.
 export const isStated = (state) => missing(state).length === 0;
 
-// A choice that shows no value until the person has made it.
+// A choice by one click, without a value until the person has made it.
 function asked(state, path, label, choices, value, note) {
   const open = missing(state).includes(path);
-  const made = select([...(open ? [['', 'choose \u2026']] : []), ...choices], open ? '' : value,
-                      (next) => { if (next) { act('set', {path, value: next}); } });
-  const row = field(label, made, note);
-  row.classList.toggle('open', open);
-  row.dataset.ask = path;
-  return row;
+  const one = ([next, text]) => check(text, element('input', {type: 'radio', name: path, value: next,
+      checked: !open && next === value, onchange: () => act('set', {path, value: next})}));
+  return element('div', {className: `field${open ? ' open' : ''}`, role: 'radiogroup', 'aria-label': label, dataset: {ask: path}},
+                 element('span', {textContent: label}), element('div', {}, ...choices.map(one)), note ? element('small', {textContent: note}) : null);
 }
 
 const textField = (label, value, send, properties = {}, note) => field(label, element('input', {
@@ -65,7 +63,7 @@ function personGroup(state) {
 // A selector of the field that has the keyboard, so that a new panel can give it back; null for none.
 const focusedField = (root) => {
   const now = document.activeElement, row = now && root.contains(now) && now.closest('[data-ask]');
-  return row ? `[data-ask="${row.dataset.ask}"] select` : now && now.dataset.record ? `[data-record="${now.dataset.record}"]` : null;
+  return row ? `[data-ask="${row.dataset.ask}"] :checked` : now && now.dataset.record ? `[data-record="${now.dataset.record}"]` : null;
 };
 
 export function personPanel(bench) {

@@ -51,9 +51,7 @@ def expect_questions(browser):
     browser.run("window.semblance.makeFace()")
     assert "state the person" in browser.run(MESSAGE)
     for path, value in (("tissue.table", "rhine_caucasoid"), ("tissue.sex", "female"), ("tissue.build", "normal")):
-        browser.run("const choice = document.querySelector(`[data-ask='${arguments[0]}'] select`);"
-                    "choice.value = [...choice.options].find((option) => option.value.includes(arguments[1])).value;"
-                    "choice.dispatchEvent(new Event('change'))", path, value)
+        browser.click(f"[data-ask='{path}'] input[value*='{value}']")
         browser.wait("return window.semblance.store.state.settings.some((setting) => setting.path === arguments[0])", path)
     assert browser.run(open_fields) == []
     assert state(browser)["values"]["tissue"]["sex"] == "female"
