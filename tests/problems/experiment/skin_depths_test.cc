@@ -18,6 +18,12 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
+RunContext Threads(int threads) {
+  RunContext context;
+  context.threads = threads;
+  return context;
+}
+
 Experiment OnSkin() {
   Experiment experiment;
   experiment.subject = PhantomOptions{.random_seed = 5, .rings = 40};
@@ -26,7 +32,7 @@ Experiment OnSkin() {
 }
 
 SubjectData LoadPhantom(const Experiment& experiment) {
-  return LoadSubject(experiment.subject, RunContext{.threads = 2});
+  return LoadSubject(experiment.subject, Threads(2));
 }
 
 // The distance along the ray to the triangle, or infinity, by Cramer's rule.
@@ -45,7 +51,7 @@ TEST(MeasureOnSkin, FindsWhatARayThroughAllTrianglesFinds) {
   const MeshQuery skull(subject.skull);
   const std::vector<Dowel> dowels =
       PlaceDowels(subject.landmarks, subject.skull, skull, experiment.landmarks);
-  EXPECT_THAT(MeasureOnSkin(experiment, skull, RunContext{.threads = 2}, subject), IsEmpty());
+  EXPECT_THAT(MeasureOnSkin(experiment, skull, Threads(2), subject), IsEmpty());
   for (std::size_t k = 0; k < dowels.size(); ++k) {
     double first = std::numeric_limits<double>::infinity();
     for (const Triangle& t : subject.skin->triangles) {
@@ -60,12 +66,12 @@ TEST(MeasureOnSkin, FindsWhatARayThroughAllTrianglesFinds) {
 TEST(MeasureOnSkin, IgnoresTheDepthsOfTheLandmarkFile) {
   const Experiment experiment = OnSkin();
   SubjectData subject = LoadPhantom(experiment);
-  const Case right = MakeCase(subject, experiment, RunContext{.threads = 2});
+  const Case right = MakeCase(subject, experiment, Threads(2));
   for (Landmark& landmark : subject.landmarks.landmarks) {
     landmark.depth_along_normal_mm = 1;
     landmark.depth_closest_mm.reset();
   }
-  const Case again = MakeCase(subject, experiment, RunContext{.threads = 1});
+  const Case again = MakeCase(subject, experiment, Threads(1));
   ASSERT_THAT(again.dowels_on_bone, SizeIs(right.dowels_on_bone.size()));
   for (std::size_t k = 0; k < right.dowels_on_bone.size(); ++k) {
     EXPECT_EQ(again.dowels_on_bone[k].depth_mm, right.dowels_on_bone[k].depth_mm);
@@ -79,7 +85,7 @@ TEST(MeasureOnSkin, LeavesOutSitesWithoutSkinInFront) {
   const Vec3 hole = nasion->Position();
   std::erase_if(subject.skin->triangles,
                 [&](const Triangle& t) { return (subject.skin->points[t[0]] - hole).norm() < 40; });
-  const Case made = MakeCase(subject, experiment, RunContext{.threads = 2});
+  const Case made = MakeCase(subject, experiment, Threads(2));
   EXPECT_EQ(std::ranges::find(made.dowels_on_bone, "n", &Dowel::site), made.dowels_on_bone.end());
   EXPECT_THAT(made.notes,
               ::testing::Contains(HasSubstr("n (Nasion): no depth along the normal: no skin")));
@@ -91,7 +97,7 @@ TEST(MeasureOnSkin, RefusesASubjectWithoutSkin) {
   SubjectData subject = LoadPhantom(experiment);
   subject.skin.reset();
   try {
-    MakeCase(subject, experiment, RunContext{.threads = 2});
+    MakeCase(subject, experiment, Threads(2));
     FAIL() << "no error";
   } catch (const InputError& e) {
     EXPECT_THAT(e.what(), HasSubstr("no true skin to measure on; name one under subject.skin"));
