@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What errors that points share look like: those of rounding, and those of neighbours. The fit
-// smooths over both (nested_fit.cc); NestedWeightSearch::FindSharedErrors finds the latter.
+// Statistics that show errors which points share: those of rounding, and those of neighbours. The
+// fit smooths over both (nested_fit.cc); NestedWeightSearch::FindSharedErrors finds the latter.
 #pragma once
 
 #include <vector>

@@ -3,8 +3,6 @@
 
 #include <fmt/format.h>
 
-#include <optional>
-
 #include "interp/evaluation/depth_truth.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -12,11 +10,8 @@
 namespace semblance::problems {
 namespace {
 
-using interp::DepthTruth;
-using interp::TruthMap;
-
-DepthTruth MeasureAt(const std::vector<Dowel>& dowels, const TriMesh& skin,
-                     const DepthTruthOptions& options, const RunContext& context) {
+interp::TruthMap MeasureAt(const std::vector<Dowel>& dowels, const TriMesh& skin,
+                           const DepthTruthOptions& options, const RunContext& context) {
   TriMesh bases;
   std::vector<Vec3> directions;
   for (const Dowel& dowel : dowels) {
@@ -24,12 +19,7 @@ DepthTruth MeasureAt(const std::vector<Dowel>& dowels, const TriMesh& skin,
     directions.push_back(dowel.direction);
   }
   const TriMesh outside = Submesh(skin, SeenFromOutside(skin, context.threads));
-  return MeasureDepthTruth(bases, directions, outside, options, context);
-}
-
-std::optional<double> DepthOf(const TruthMap& map, std::size_t k) {
-  return map.status[k] == interp::TruthStatus::kValid ? std::optional(map.depth_mm[k])
-                                                      : std::nullopt;
+  return MeasureDepthTruth(bases, directions, outside, options, context).along_direction;
 }
 
 }  // namespace
@@ -44,16 +34,18 @@ std::vector<std::string> MeasureOnSkin(const Experiment& experiment, const MeshQ
   std::vector<Landmark>& landmarks = subject.landmarks.landmarks;
   const std::vector<Dowel> dowels =
       PlaceDowels(subject.landmarks, subject.skull, skull, experiment.landmarks);
-  const DepthTruth truth = MeasureAt(dowels, *subject.skin, experiment.depth_truth, context);
+  const interp::TruthMap truth = MeasureAt(dowels, *subject.skin, experiment.depth_truth, context);
   std::vector<std::string> notes;
   for (std::size_t k = 0; k < dowels.size(); ++k) {
     Landmark& landmark = landmarks.at(k);
-    landmark.depth_along_normal_mm = DepthOf(truth.along_direction, k);
-    landmark.depth_closest_mm = DepthOf(truth.closest, k);
-    if (!landmark.depth_along_normal_mm) {
+    landmark.depth_along_normal_mm.reset();
+    landmark.depth_closest_mm.reset();
+    if (truth.status[k] == interp::TruthStatus::kValid) {
+      landmark.depth_along_normal_mm = truth.depth_mm[k];
+    } else {
       notes.push_back(fmt::format("site {}: no depth along the normal: {}",
                                   DescribeSite(landmark.site),
-                                  interp::DescribeStatus(truth.along_direction.status[k])));
+                                  interp::DescribeStatus(truth.status[k])));
     }
   }
   return notes;

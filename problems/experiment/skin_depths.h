@@ -10,10 +10,10 @@
 
 namespace semblance::problems {
 
-// Replaces the depths of all landmarks by those to the skin that is seen from outside: along the
-// direction of the landmark's dowel, and to the closest point. A landmark where none can be
-// measured has no depth afterwards. Returns a note on each of those, with the reason. Throws
-// InputError if the subject has no skin; throws Cancelled.
+// Replaces the depths of all landmarks by those along the directions of their dowels, to the skin
+// that is seen from outside. A landmark where none can be measured, as before a hole, has no depth
+// afterwards: the closest skin lies beside it. Returns a note on each of those, with the reason.
+// Throws InputError if the subject has no skin; throws Cancelled.
 std::vector<std::string> MeasureOnSkin(const Experiment& experiment, const MeshQuery& skull,
                                        const RunContext& context, SubjectData& subject);
 

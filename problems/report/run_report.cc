@@ -319,15 +319,13 @@ void AddProtocols(const Json& face, ReportSection& section) {
   section.tables.push_back(std::move(table));
 }
 
-ReportSection ErrorSection(const Json& result, const OutputFolder& folder) {
+ReportSection ErrorSection(const Json& result) {
   ReportSection section{.heading = "Against the true skin", .folded = true};
   section.paragraphs = {
       "The score covers the outer skin of the face, without the zones that the configuration "
       "excludes (see resolved.yaml, region, and the picture of the scored skin). Distances go to "
       "the closest point and are weighted by area. Nothing was aligned to the true skin, except "
       "where a table says so."};
-  section.images = {ReportImageFromFile(folder.Root() / "pictures/truth.png", "The true skin.",
-                                        "the true skin from three sides")};
   section.images.push_back(
       {QuantilePlotSvg({{"recovered face", Numbers(result.at("face").at("quantiles_mm"))},
                         {"first face (implicit surface)",
@@ -346,13 +344,12 @@ ReportSection PictureSection(const OutputFolder& folder) {
   struct Picture {
     const char *file, *caption;
   };
-  ReportSection section{.heading = "From skull to face, in pictures",
-                        .paragraphs = {"The 3-D view also shows the tissue depth on the skull and, "
-                                       "where the run has them, the head and the errors of both "
-                                       "faces."},
-                        .folded = true};
+  ReportSection section{
+      .heading = "From skull to face, in pictures",
+      .paragraphs = {"The 3-D view also shows the tissue depth on the skull, the true skin, the "
+                     "head and the errors of both faces, as far as the run has them."},
+      .folded = true};
   for (const Picture& picture : std::vector<Picture>{
-           {"skull_dowels", "Skull with depth markers."},
            {"implicit", "First face, straight from the depths (implicit surface)."},
            {"face", "Recovered face."},
            {"face_over_skull", "Recovered face, translucent, over skull and depth markers."}}) {
@@ -619,7 +616,7 @@ ReportSection ProvenanceSection(const std::filesystem::path& file) {
 std::vector<ReportSection> Sections(const Json& result, const OutputFolder& folder) {
   std::vector<ReportSection> sections;
   if (!result.at("face").is_null()) {
-    sections.push_back(ErrorSection(result, folder));
+    sections.push_back(ErrorSection(result));
   }
   if (HasAlternatives(folder)) {
     const std::filesystem::path alternatives = folder.Root() / "alternatives.json";

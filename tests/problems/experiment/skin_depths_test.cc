@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <limits>
 
 #include "surfaces/base/error.h"
@@ -27,6 +28,8 @@ RunContext Threads(int threads) {
 Experiment OnSkin() {
   Experiment experiment;
   experiment.subject = PhantomOptions{.random_seed = 5, .rings = 40};
+  experiment.network =
+      std::filesystem::path(SEMBLANCE_SOURCE_DIR) / "configs/networks/standard32.yaml";
   experiment.tissue.depths = DepthSource::kSkin;
   return experiment;
 }
@@ -59,7 +62,6 @@ TEST(MeasureOnSkin, FindsWhatARayThroughAllTrianglesFinds) {
     }
     const Landmark& landmark = subject.landmarks.landmarks[k];
     EXPECT_NEAR(landmark.depth_along_normal_mm.value(), first, 1e-6) << landmark.site;
-    EXPECT_LE(landmark.depth_closest_mm.value(), first + 1e-6) << landmark.site;
   }
 }
 
