@@ -233,6 +233,14 @@ Case StartCase(const SubjectData& data, const Experiment& experiment, const Mesh
   }
   subject.dowels_on_bone = PlaceDowels(data.landmarks, data.skull, query, experiment.landmarks);
   subject.turns_deg = TurnsOfDowels(data.landmarks, data.skull, query, experiment.landmarks);
+  for (const auto& [site, turn_deg] : subject.turns_deg) {
+    if (turn_deg > kMaxTurn_deg) {
+      subject.notes.push_back(
+          fmt::format("site {}: its proposed direction is {:.0f} degrees off the bone nearest to "
+                      "it, which may be an inner wall; look at this landmark",
+                      DescribeSite(site), turn_deg));
+    }
+  }
   for (const Landmark& landmark : data.landmarks.landmarks) {
     subject.points[landmark.site] = landmark.Position();
   }

@@ -233,7 +233,7 @@ std::map<std::string, double> TurnsOfDowels(const LandmarkFile& file, const TriM
     const Vec3 direction = Vec3(landmark.normal->data()).normalized();
     const double turn_deg =
         std::atan2(own.cross(direction).norm(), own.dot(direction)) * 180 / std::numbers::pi;
-    if (turn_deg > kMaxTurn_deg) {
+    if (turn_deg > kMaxTurn_deg && !file.proposed) {
       throw InputError(
           fmt::format("{}: site {}: its direction is turned by {:.0f} degrees from the bone's own, "
                       "so the dowel "

@@ -179,7 +179,9 @@ std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
 // The angles, in degrees, between the normals that the file gives and AveragedNormal at the dowels'
 // bases, by site: by how much a person, or another program, has turned each dowel. Sites without a
 // normal, or on bone without area, are left out. Throws InputError for a normal that is more than
-// kMaxTurn_deg off, because the dowel would run along the bone or into the head.
+// kMaxTurn_deg off, because the dowel would run along the bone or into the head. Proposals that
+// nobody has confirmed are kept: the nearest bone may be an inner wall, and their normal is that of
+// the site.
 inline constexpr double kMaxTurn_deg = 75;
 std::map<std::string, double> TurnsOfDowels(const LandmarkFile& file, const TriMesh& skull,
                                             const MeshQuery& query, const PlaceOptions& options);

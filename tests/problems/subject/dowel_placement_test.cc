@@ -298,5 +298,12 @@ TEST(DowelDirections, SidewaysAndIntoTheHeadAreRefused) {
   }
 }
 
+TEST(DowelDirections, OfAProposalNobodyHasConfirmedAreKept) {
+  const TriMesh ball = SphereMesh({0, 0, 0}, 50, 60);
+  LandmarkFile file = TiltedOnTop(120);
+  file.proposed = true;
+  EXPECT_NEAR(TurnsOfDowels(file, ball, MeshQuery(ball), {}).at("g"), 120, 0.2);
+}
+
 }  // namespace
 }  // namespace semblance::problems
