@@ -5,7 +5,8 @@ expert's landmarks. The person who clicks knows three sites: nasion and both zyg
 usage: clicks_to_report.py PROGRAM FOLDER                        a phantom's CT with slices at unequal distances
        clicks_to_report.py PROGRAM FOLDER CT LANDMARKS [TABLE]   a CT, where its landmarks lie, and the table of depths
 
-Exit code 77: skipped, as something is not installed. 1: a limit of LIMITS is exceeded.
+Exit code 77: skipped, as something is not installed. 1: a limit of LIMITS is exceeded. The goal for the seconds is 360; they
+fail no test, as machines differ.
 """
 import json
 import pathlib
@@ -18,7 +19,7 @@ import webdriver
 from workbench_page import PLACE, SKIPPED, Workbench
 
 FIRST_CLICKS = ("n", "zy_l", "zy_r")
-LIMITS = {"clicks": 12, "seconds": 360, "bone outside (%)": 1, "worse than the expert's (mm)": 0.15}
+LIMITS = {"clicks": 12, "bone outside (%)": 1, "worse than the expert's (mm)": 0.15}
 PHANTOM = ["--random-seed", "3", "--pixel-mm", "1.5", "--slice-mm", "1"]
 IDLE = "return window.semblance.store.state.job.state !== 'running' && !window.semblance.faces.busy" \
        " && !window.semblance.opener.waits"
