@@ -16,8 +16,9 @@ namespace semblance::fitting {
 // - 1. The four points of a patch have consecutive numbers.
 inline Vec2 GaussPoint(int k, int columns, int rows) {
   const double off = 0.5 / std::numbers::sqrt3;
-  return {(k / 4 % columns + 0.5 + (k % 2 == 0 ? -off : off)) / columns,
-          (k / 4 / columns + 0.5 + (k % 4 < 2 ? -off : off)) / rows};
+  const int column = k / 4 % columns, row = k / 4 / columns;
+  return {(column + 0.5 + (k % 2 == 0 ? -off : off)) / columns,
+          (row + 0.5 + (k % 4 < 2 ? -off : off)) / rows};
 }
 
 // Maps the template's unit tangents to a surface: e1 lies along the template's du, e2 across it in
