@@ -9,10 +9,14 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
 
 #include "problems/app/exit_code.h"
 #include "problems/app/work_options.h"
 #include "problems/config/terminal_text.h"
+#include "problems/face/person_phantom.h"
 #include "problems/io/output_folder.h"
 #include "problems/io/staged_folder.h"
 #include "problems/io/volumes/itk_files.h"
@@ -20,17 +24,26 @@
 #include "problems/subject/landmark_files/read_landmarks.h"
 #include "problems/subject/phantom.h"
 #include "problems/subject/phantom_ct.h"
+#include "problems/subject/sites.h"
 #include "surfaces/base/error.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance::problems {
 namespace {
 
+// The head that the command writes: a person's, or one by formula with one of the bones of
+// PhantomBone.
+enum class PhantomKind { kPerson, kSmooth, kLikePeople };
+constexpr auto EnumNames(PhantomKind) {
+  return std::to_array<std::string_view>({"person", "smooth", "like_people"});
+}
+
 // The arguments of the command.
 struct PhantomArguments {
   std::string out;
   std::string volume;  // further file with the whole CT; empty: none
-  PhantomOptions phantom;
+  PhantomKind kind = PhantomKind::kPerson;
+  std::uint64_t random_seed = 1;
   PhantomCtOptions ct;
   bool force = false;
 };
@@ -66,27 +79,56 @@ void WriteVolumeFile(const CtVolume& volume, const std::string& name, VolumeForm
   Tell("{}: the CT in one file\n", name);
 }
 
+// A phantom as the command writes it.
+struct ScannedPhantom {
+  CtVolume volume;
+  std::vector<PhantomSite> sites;
+  TriMesh skin;
+};
+
+ScannedPhantom ScanPerson(const PhantomArguments& a) {
+  RunContext context;
+  context.threads = a.ct.threads;
+  PersonPhantom person = MakePersonPhantom(a.random_seed, context);
+  Tell("a made-up person, {:+.1f} standard deviations of tissue from the mean of people\n",
+       person.build);
+  return {VoxelisePerson(person, a.ct), std::move(person.sites), std::move(person.true_skin)};
+}
+
+ScannedPhantom ScanFormula(const PhantomArguments& a) {
+  Phantom phantom = MakePhantom(
+      {.random_seed = a.random_seed,
+       .bone = a.kind == PhantomKind::kSmooth ? PhantomBone::kSmooth : PhantomBone::kLikePeople});
+  return {VoxelisePhantom(phantom, a.ct), std::move(phantom.sites), std::move(phantom.face)};
+}
+
+// Throws InputError, before anything is computed, for a defect at a site that no head has.
+void CheckDefect(const BoneDefect& defect) {
+  if (!defect.site.empty() && !IsStandardSite(defect.site)) {
+    LostBone({}, defect);
+  }
+}
+
 int WritePhantom(const PhantomArguments& a) {
   const std::optional<VolumeFormat> format = CheckVolumeName(a.volume);
-  const Phantom phantom = MakePhantom(a.phantom);
-  const LostBone lost(phantom,
-                      a.ct.defect);  // throws for an unknown site before the folder is made
+  CheckDefect(a.ct.defect);
   StagedFolder staged(a.out, a.force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse);
   OutputFolder& folder = staged.Files();
-  const CtVolume volume = VoxelisePhantom(phantom, a.ct);
-  WriteSlices(volume, a.phantom.random_seed, folder);
-  LandmarkFile landmarks = PhantomLandmarks(phantom, a.phantom.random_seed);
+  const ScannedPhantom scan = a.kind == PhantomKind::kPerson ? ScanPerson(a) : ScanFormula(a);
+  const LostBone lost(scan.sites, a.ct.defect);
+  WriteSlices(scan.volume, a.random_seed, folder);
+  LandmarkFile landmarks = PhantomLandmarks(scan.sites, a.random_seed);
   std::erase_if(landmarks.landmarks, [&](const Landmark& l) { return lost.Holds(l.Position()); });
   folder.Write("landmarks.yaml", EncodeLandmarks(landmarks, "landmarks.yaml"));
-  folder.Write("true_skin.ply", EncodeMesh(phantom.face, ".ply"));
+  folder.Write("true_skin.ply", EncodeMesh(scan.skin, ".ply"));
   Tell(
       "ct: {} DICOM slices of {} x {} voxels, {} x {} x {} mm\n"
       "landmarks.yaml: {} sites, with their true depths\n"
       "true_skin.ply: {} triangles\n",
-      volume.slices, volume.columns, volume.rows, a.ct.pixel_mm, a.ct.pixel_mm, a.ct.slice_mm,
-      landmarks.landmarks.size(), phantom.face.triangles.size());
+      scan.volume.slices, scan.volume.columns, scan.volume.rows, a.ct.pixel_mm, a.ct.pixel_mm,
+      a.ct.slice_mm, landmarks.landmarks.size(), scan.skin.triangles.size());
   if (format) {
-    WriteVolumeFile(volume, a.volume, *format, folder);
+    WriteVolumeFile(scan.volume, a.volume, *format, folder);
   }
   staged.Publish();
   Tell("next: semblance import-ct {}\n", (staged.Root() / "ct").string());
@@ -98,11 +140,14 @@ void DeclarePhantom(CLI::App& command, CommandLine& line) {
   a.ct.threads = DefaultThreads();
   command.add_option("--out", a.out, "folder for ct/, landmarks.yaml and true_skin.ply")
       ->required();
-  command.add_option("--random-seed,--seed", a.phantom.random_seed, "number of the head")
+  command.add_option("--random-seed,--seed", a.random_seed, "number of the head")
       ->check(WholeNumber())
       ->capture_default_str();
-  AddChoice(command, "--bone", "smooth; like_people: rough, with hollows and ridges",
-            a.phantom.bone);
+  AddChoice(
+      command, "--head",
+      "person: skull and face drawn from models of people, with nose, lips, eyes and ears; by "
+      "formula: smooth, or like_people with rough bone, hollows and ridges",
+      a.kind);
   command.add_option("--pixel-mm", a.ct.pixel_mm, "distance of columns and of rows")
       ->check(Finite())
       ->check(CLI::Range(0.3, 5.0))

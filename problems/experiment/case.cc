@@ -63,7 +63,7 @@ LandmarkFile Load(const PhantomOptions& options, Landmarking, SubjectData& subje
   Phantom phantom = MakePhantom(options);
   subject.skull = std::move(phantom.skull);
   subject.skin = std::move(phantom.face);
-  return PhantomLandmarks(phantom, options.random_seed);
+  return PhantomLandmarks(phantom.sites, options.random_seed);
 }
 
 void Mirror(const MirrorOptions& options, LandmarkFile& landmarks, SubjectData& subject,

@@ -284,10 +284,10 @@ Phantom MakePhantom(const PhantomOptions& options) {
   return phantom;
 }
 
-LandmarkFile PhantomLandmarks(const Phantom& phantom, std::uint64_t random_seed) {
+LandmarkFile PhantomLandmarks(std::span<const PhantomSite> sites, std::uint64_t random_seed) {
   LandmarkFile file;
   file.subject = fmt::format("phantom {}", random_seed);
-  for (const PhantomSite& site : phantom.sites) {
+  for (const PhantomSite& site : sites) {
     Landmark landmark;
     landmark.site = site.site;
     landmark.MoveTo(site.base);

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -74,8 +75,8 @@ std::string RingsFault(const PhantomOptions& options);
 // The same options give the same bytes. Throws InputError for a RingsFault.
 Phantom MakePhantom(const PhantomOptions& options);
 
-// The landmarks that people would place on the phantom's skull: all sites, with their exact normals
+// The landmarks that people would place on a phantom's skull: all sites, with their exact normals
 // and the depths along them. `random_seed` only serves to name the subject.
-LandmarkFile PhantomLandmarks(const Phantom& phantom, std::uint64_t random_seed);
+LandmarkFile PhantomLandmarks(std::span<const PhantomSite> sites, std::uint64_t random_seed);
 
 }  // namespace semblance::problems

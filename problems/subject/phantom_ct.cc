@@ -79,6 +79,18 @@ std::vector<double> RowCoverage(const MeshQuery& mesh, const CtVolume& volume, i
   return coverage;
 }
 
+// The fraction of each voxel of a row that is inside the mesh in which most of it is.
+std::vector<double> TissueOfRow(const std::vector<MeshQuery>& tissue, const CtVolume& volume,
+                                int row, int slice) {
+  std::vector<double> most = RowCoverage(tissue.front(), volume, row, slice);
+  for (std::size_t k = 1; k < tissue.size(); ++k) {
+    const std::vector<double> other = RowCoverage(tissue[k], volume, row, slice);
+    std::ranges::transform(most, other, most.begin(),
+                           [](double a, double b) { return std::max(a, b); });
+  }
+  return most;
+}
+
 // The inner side of the skull: its outer side drawn towards the centre.
 TriMesh InnerTable(const Phantom& phantom, double bone_mm) {
   TriMesh inner = phantom.skull;
@@ -99,12 +111,12 @@ bool InHolder(const Vec3& p, const Box3& head, const PhantomCtOptions& options) 
 
 }  // namespace
 
-LostBone::LostBone(const Phantom& phantom, const BoneDefect& defect) {
+LostBone::LostBone(std::span<const PhantomSite> sites, const BoneDefect& defect) {
   if (defect.site.empty()) {
     return;
   }
-  const auto site = std::ranges::find(phantom.sites, defect.site, &PhantomSite::site);
-  if (site == phantom.sites.end()) {
+  const auto site = std::ranges::find(sites, defect.site, &PhantomSite::site);
+  if (site == sites.end()) {
     throw InputError(
         fmt::format("phantom: the head has no site '{}' to lose bone at; docs/reference/sites.md "
                     "lists the sites",
@@ -114,34 +126,48 @@ LostBone::LostBone(const Phantom& phantom, const BoneDefect& defect) {
   radius_mm_ = defect.radius_mm;
 }
 
-CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options) {
+CtVolume VoxeliseHead(const ScannedHead& head, const PhantomCtOptions& options) {
   if (!(options.pixel_mm > 0) || !(options.slice_mm > 0)) {
     throw InputError(fmt::format("phantom: voxels of {} x {} mm are not usable; each must be > 0",
                                  options.pixel_mm, options.slice_mm));
   }
-  const LostBone lost(phantom, options.defect);
-  const Box3 head = Bounds(phantom.face);
-  const MeshQuery skin(phantom.face), bone(phantom.skull);
-  const MeshQuery inner(InnerTable(phantom, options.bone_mm));
-  CtVolume volume = EmptyVolume(head, options);
+  const LostBone lost(head.sites, options.defect);
+  const Box3 box = Bounds(*head.tissue.front());
+  std::vector<MeshQuery> tissue;
+  for (const TriMesh* mesh : head.tissue) {
+    tissue.emplace_back(*mesh);
+  }
+  CtVolume volume = EmptyVolume(box, options);
   const std::size_t lines = static_cast<std::size_t>(volume.rows) * volume.slices;
   ParallelFor(lines, options.threads, 64, [&](std::size_t line) {
     const int row = static_cast<int>(line % volume.rows);
     const int slice = static_cast<int>(line / volume.rows);
-    const std::vector<double> in_skin = RowCoverage(skin, volume, row, slice);
-    const std::vector<double> in_bone = RowCoverage(bone, volume, row, slice);
-    const std::vector<double> in_brain = RowCoverage(inner, volume, row, slice);
+    const std::vector<double> in_tissue = TissueOfRow(tissue, volume, row, slice);
+    const std::vector<double> in_bone = head.bone(volume, row, slice);
     for (int i = 0; i < volume.columns; ++i) {
       const Vec3 at = volume.World(i, row, slice);
-      const double bone_here = lost.Holds(at) ? 0 : in_bone[i] - in_brain[i];
+      const double bone_here = lost.Holds(at) ? 0 : in_bone[i];
       const double hu =
-          kAirHu + in_skin[i] * (kTissueHu - kAirHu) + bone_here * (kBoneHu - kTissueHu);
-      const bool holder = InHolder(at, head, options);
+          kAirHu + in_tissue[i] * (kTissueHu - kAirHu) + bone_here * (kBoneHu - kTissueHu);
+      const bool holder = InHolder(at, box, options);
       volume.values[volume.Index(i, row, slice)] =
           static_cast<std::int16_t>(std::lround(holder ? kPlasticHu : hu));
     }
   });
   return volume;
+}
+
+CtVolume VoxelisePhantom(const Phantom& phantom, const PhantomCtOptions& options) {
+  const MeshQuery outer(phantom.skull), inner(InnerTable(phantom, options.bone_mm));
+  const auto bone = [&](const CtVolume& volume, int row, int slice) {
+    std::vector<double> share = RowCoverage(outer, volume, row, slice);
+    const std::vector<double> in_brain = RowCoverage(inner, volume, row, slice);
+    for (std::size_t i = 0; i < share.size(); ++i) {
+      share[i] -= in_brain[i];
+    }
+    return share;
+  };
+  return VoxeliseHead({{&phantom.face}, bone, phantom.sites}, options);
 }
 
 }  // namespace semblance::problems

@@ -21,7 +21,7 @@ def call(*words, code=0):
 
 
 def make_head(program, folder, head):
-    call(program, "phantom", "--out", folder / "phantom", "--pixel-mm", 3, "--slice-mm", 3)
+    call(program, "phantom", "--head", "smooth", "--out", folder / "phantom", "--pixel-mm", 3, "--slice-mm", 3)
     call(program, "import-ct", folder / "phantom/ct", "--out", folder / "import", "--quiet")
     head.mkdir(parents=True)
     for name, source in (("skull.ply", "import/skull.ply"), ("skin.ply", "import/skin.ply"), ("landmarks.yaml", "phantom/landmarks.yaml")):

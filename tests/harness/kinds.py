@@ -451,7 +451,7 @@ CALLS = {
     "feature fuse": [BALL, BALL, "--out", "out.ply"],
     "landmarks convert": [SITES, "out.csv"], "landmarks page": [GOOD + "t_table_2023.yaml", "--out", "out"], "landmarks propose": ["nosuch.ply"],
     "template": [GOOD + "experiment.yaml", "--out", "out", "--quiet"], "recentre": ["nosuch.yaml", "--out", "out"],
-    "phantom": ["--out", "out", "--pixel-mm=5", "--slice-mm=10"], "workbench": ["nosuch.ply"], "completion": ["bash"], "manual": [],
+    "phantom": ["--out", "out", "--head=smooth", "--pixel-mm=5", "--slice-mm=10"], "workbench": ["nosuch.ply"], "completion": ["bash"], "manual": [],
 }
 WORDS = ["", " ", "0", "-1", "1", "nan", "inf", "1e999", "1e308", "-0", "4294967296", "99999999999999999999", "0x10", "1.5", "abc", "'", "\"", "--", "-", "a b",
          "a\nb", "\x1b[2J", "\u202ex", "\U0001f480", "x" * 5000, "/", "..", ".", "nosuch/file", "=", "=1", "a=b", "a=", "%n%s", "$(id)", "`id`", "*", "~", "true", "1/2", "0/0"]
@@ -519,7 +519,7 @@ def output_arguments():
         ["edit", FACE, GOOD + "edits.yaml", "--out", "out.json", "--inverse", "HERE"], ["export", FACE, "--to", "HERE.ply", "--chord_mm", "5"],
         ["feature", "mirror", GOOD + "library/nose.json", "--name", "a", "--library", "HERE"], ["feature", "apply", FACE, GOOD + "library/nose.json", "--out", "HERE"],
         ["landmarks", "convert", SITES, "HERE.csv"], ["landmarks", "page", GOOD + "t_table_2023.yaml", "--out", "HERE"],
-        ["template", GOOD + "experiment.yaml", "--out", "HERE", *QUIET], ["phantom", "--out", "HERE", "--pixel-mm", "5", "--slice-mm", "10"],
+        ["template", GOOD + "experiment.yaml", "--out", "HERE", *QUIET], ["phantom", "--out", "HERE", "--head", "smooth", "--pixel-mm", "5", "--slice-mm", "10"],
         ["merge", "HERE", GOOD + "shard0", GOOD + "shard1"], ["compare", GOOD + "study", GOOD + "shard0", "--out", "HERE"],
         ["study", GOOD + "study.yaml", "--out", "HERE", "--quiet"], ["workbench", "--out", "HERE/x"],
     ]

@@ -242,7 +242,7 @@ class World:
 
     def make_head(self, k, random_seed):
         self.call("depth", "face.yaml", "--set", f"subject={{type: phantom, random_seed: {random_seed}, rings: {RINGS}}}", "--out", f"skull{k}", *QUIET)
-        self.call("phantom", "--random-seed", random_seed, "--out", f"head{k}", "--pixel-mm", 5, "--slice-mm", 8)
+        self.call("phantom", "--head", "smooth", "--random-seed", random_seed, "--out", f"head{k}", "--pixel-mm", 5, "--slice-mm", 8)
         marks = read_marks((self.folder / f"head{k}/landmarks.yaml").read_text())
         head = Head(read_ply(self.folder / f"skull{k}/depth.ply"), read_ply(self.folder / f"head{k}/true_skin.ply"), marks)
         folder = self.folder / f"plain{k}"

@@ -194,7 +194,7 @@ class Maker:
 
     def heads(self):
         self.call("run", "experiment.yaml", "--out", "run", "--quiet")
-        self.call("phantom", "--out", "phantom", "--pixel-mm", "5", "--slice-mm", "8")
+        self.call("phantom", "--head", "smooth", "--out", "phantom", "--pixel-mm", "5", "--slice-mm", "8")
         self.call("import-ct", "phantom/ct", "--out", "import", "--quiet")
         self.write("head.yaml", f"base: {self.configs}/phantom.yaml\nsubject: {{type: files, skull: import/skull.ply, skin: import/skin.ply, "
                    "landmarks: phantom/landmarks.yaml}\n")

@@ -23,7 +23,7 @@ TRACE = ["strace", "-f", "-qq", "--seccomp-bpf", "-e", "trace=network", "-o"]
 FACE = "run/face.hspline.json"
 # Each command, with the exit codes that these words may have.
 CALLS = [
-    (0, "phantom --out phantom --pixel-mm 5 --slice-mm 10"), (0, "import-ct phantom/ct --out import --quiet"), (0, "run experiment.yaml --out run --quiet"),
+    (0, "phantom --head smooth --out phantom --pixel-mm 5 --slice-mm 10"), (0, "import-ct phantom/ct --out import --quiet"), (0, "run experiment.yaml --out run --quiet"),
     (0, "depth experiment.yaml --out depth --quiet"), (0, "report run"), (0, "fit points.csv fit.yaml --out fit --quiet"), (0, "check experiment.yaml fit.yaml study.yaml"),
     (0, "options fit"), (0, "evaluate import/skin.ply phantom/true_skin.ply --quiet"), (0, "study study.yaml --out study --quiet"), (0, "status study"),
     (0, "merge merged study"), (0, "compare study merged"), (0, f"edit {FACE} edits.yaml --out edited.json"), (0, f"export {FACE} --to face.step"),

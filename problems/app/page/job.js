@@ -25,7 +25,7 @@ export class Job {
     this.runButton.disabled = runs || face.saved || state.landmarks.length === 0;
     this.runButton.textContent = face.saved ? 'The full face is made' : 'Make the full face';
     this.runButton.classList.toggle('primary', !face.saved);
-    this.show(job, face);
+    this.show(state);
     this.showSteps(job, runs);
     if (runs && !this.timer) {
       this.timer = setInterval(() => refresh().catch((error) => { this.stop(); showMessage(error.message); }), EVERY_MS);
@@ -52,7 +52,7 @@ export class Job {
     this.progress.scrollTop = this.progress.scrollHeight;
   }
 
-  show(job, face) {
+  show({job, face, landmarks}) {
     const parts = [];
     if (job.state === 'running') {
       const bar = element('progress', {max: 1});
@@ -63,7 +63,7 @@ export class Job {
       parts.push(element('span', {className: 'bad', textContent: `${NAMES[job.name]}: ${job.words}`}));
     } else if (job.state === 'stopped' && !face.saved && job.name !== 'open') {
       parts.push(element('span', {textContent: `${NAMES[job.name]}: stopped`}));
-    } else if (job.state === 'done' && job.name === 'propose') {
+    } else if (job.state === 'done' && job.name === 'propose' && landmarks.some(({proposed}) => proposed)) {
       parts.push(element('span', {textContent: job.words}));
     }
     if (face.there) { parts.push(reportLink(face)); }

@@ -77,7 +77,7 @@ FileSubject ToFiles(const FileSubject& subject, const fs::path&, BenchState& sta
 FileSubject ToFiles(const PhantomOptions& subject, const fs::path& meshes, BenchState& state,
                     const RunContext&, std::vector<std::string>&) {
   const Phantom phantom = MakePhantom(subject);
-  state = ReplaceLandmarks(std::move(state), PhantomLandmarks(phantom, subject.random_seed));
+  state = ReplaceLandmarks(std::move(state), PhantomLandmarks(phantom.sites, subject.random_seed));
   return WriteMeshes(phantom.skull, phantom.face, meshes);
 }
 

@@ -403,6 +403,7 @@ class BustPoser {
       }
       const Similarity moved = from.size() < 10 ? subject_from_model_ : PlaceTemplate(from, to);
       const Sphere ball{moved * eye.center, moved.scale * eye.radius_mm};
+      bust.eyeballs.push_back(ball);
       for (EyePart& part : EyeParts(ball, subject_from_model_.rotation * -Vec3::UnitY(),
                                     subject_from_model_.rotation * Vec3::UnitZ())) {
         bust.eyes.push_back(std::move(part));
@@ -411,7 +412,8 @@ class BustPoser {
   }
 
   Bust MakeResult() const {
-    Bust bust{.skin = posed_, .eyes = {}, .subject_from_model = subject_from_model_};
+    Bust bust{
+        .skin = posed_, .eyes = {}, .eyeballs = {}, .subject_from_model = subject_from_model_};
     double sum = 0, weight = 0;
     for (const OnFace& f : on_face_) {
       sum += f.trust * (posed_.points[f.vertex] - FindTarget(f)).squaredNorm();

@@ -30,6 +30,7 @@ struct EyePart {
 struct Bust {
   TriMesh skin;  // the model's triangles
   std::vector<EyePart> eyes;
+  std::vector<Sphere> eyeballs;     // in the subject's frame, in the order of the model's
   Similarity subject_from_model;    // change of size, place and pose; the rest is deformation
   int on_face = -1, on_skull = -1;  // numbers of vertices that follow the face and the skull
   double face_rms_mm = kNaN;        // distance of the former from their targets

@@ -22,7 +22,9 @@ const std::string kImportConfigs = SEMBLANCE_SOURCE_DIR "/configs";
 class ImportCommands : public ::testing::Test {
  protected:
   void SetUp() override {
-    ASSERT_EQ(CallProgram(folder_, "phantom --out head --pixel-mm 2.5 --slice-mm 3").code, 0);
+    ASSERT_EQ(
+        CallProgram(folder_, "phantom --head smooth --out head --pixel-mm 2.5 --slice-mm 3").code,
+        0);
   }
   // Expects one line of error, exit code 2, and no new files.
   void ExpectRefused(const std::string& arguments, const std::string& words) {
@@ -66,7 +68,7 @@ TEST_F(ImportCommands, AHeadThatCannotBeMadeLeavesNoFolder) {
   for (const char* wrong : {"--volume head.mhd", "--volume head.NHDR", "--volume head.txt",
                             "--volume a/head.mha", "--volume .mha", "--lost nose"}) {
     const testing::Outcome outcome =
-        CallProgram(folder_, fmt::format("phantom --out one {}", wrong));
+        CallProgram(folder_, fmt::format("phantom --head smooth --out one {}", wrong));
     EXPECT_EQ(outcome.code, 2) << wrong;
     EXPECT_THAT(outcome.err,
                 ::testing::AnyOf(HasSubstr("not a plain name"), HasSubstr("no site 'nose'")));
@@ -77,12 +79,12 @@ TEST_F(ImportCommands, AHeadThatCannotBeMadeLeavesNoFolder) {
 TEST_F(ImportCommands, AHeadMayHaveRoughBone) {
   const auto bytes = [&](const char* path) { return ReadFileBytes(folder_ / path); };
   ASSERT_EQ(
-      CallProgram(folder_, "phantom --out rough --bone like_people --pixel-mm 2.5 --slice-mm 3")
+      CallProgram(folder_, "phantom --out rough --head like_people --pixel-mm 2.5 --slice-mm 3")
           .code,
       0);
   EXPECT_NE(bytes("rough/landmarks.yaml"), bytes("head/landmarks.yaml"));
   EXPECT_EQ(CallProgram(folder_, "import-ct rough/ct --quiet --out out").code, 0);
-  EXPECT_EQ(CallProgram(folder_, "phantom --out one --bone rough").code, 2);
+  EXPECT_EQ(CallProgram(folder_, "phantom --out one --head rough").code, 2);
   EXPECT_FALSE(fs::exists(folder_ / "one"));
 }
 

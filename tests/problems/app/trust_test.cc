@@ -197,12 +197,13 @@ TEST_F(Trust, NoLinkInAFolderLeadsAFileElsewhere) {
 }
 
 TEST_F(Trust, AKilledPhantomLeavesNoPartOfAHead) {
-  const pid_t child = Start({"phantom", "--out", "out", "--pixel-mm", "2", "--slice-mm", "3"});
+  const pid_t child =
+      Start({"phantom", "--head", "smooth", "--out", "out", "--pixel-mm", "2", "--slice-mm", "3"});
   WaitFor(folder_ / ".out.semblance-part");
   ::kill(child, SIGKILL);
   ExitCode(child);
   EXPECT_FALSE(fs::exists(folder_ / "out"));
-  EXPECT_EQ(Call("phantom --out out --pixel-mm 5 --slice-mm 10").code, 0);
+  EXPECT_EQ(Call("phantom --head smooth --out out --pixel-mm 5 --slice-mm 10").code, 0);
   EXPECT_FALSE(fs::exists(folder_ / ".out.semblance-part"));
   EXPECT_TRUE(fs::exists(folder_ / "out/landmarks.yaml"));
 }

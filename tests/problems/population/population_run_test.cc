@@ -60,7 +60,7 @@ void WriteHead(const fs::path& folder, std::uint64_t random_seed, bool with_land
   WriteFileAtomically(folder / "skin.ply", EncodeMesh(phantom.face, ".ply"));
   if (with_landmarks) {
     WriteFileAtomically(folder / "landmarks.yaml",
-                        EncodeLandmarks(PhantomLandmarks(phantom, random_seed), "landmarks.yaml"));
+                        EncodeLandmarks(PhantomLandmarks(phantom.sites, random_seed), "landmarks.yaml"));
   }
 }
 
@@ -427,7 +427,7 @@ TEST(AnalysePopulation, NotesUnsearchedOutliersAndMissingDeviations) {
 TEST(MeasureSubject, OfProposedLandmarksAtOnePointTheMostConfidentCounts) {
   const Phantom phantom = MakePhantom({.random_seed = 4, .rings = 32});
   const ScratchFolder folder;
-  LandmarkFile landmarks = PhantomLandmarks(phantom, 4);
+  LandmarkFile landmarks = PhantomLandmarks(phantom.sites, 4);
   Landmark& pg = *std::ranges::find(landmarks.landmarks, "pg", &Landmark::site);
   Landmark& sm = *std::ranges::find(landmarks.landmarks, "sm", &Landmark::site);
   sm.point = pg.point;

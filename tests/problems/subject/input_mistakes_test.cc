@@ -25,7 +25,7 @@ struct Head {
 
 Head PhantomHead(std::uint64_t random_seed, int rings = 30) {
   const Phantom phantom = MakePhantom({.random_seed = random_seed, .rings = rings});
-  return {phantom.skull, phantom.face, PhantomLandmarks(phantom, random_seed)};
+  return {phantom.skull, phantom.face, PhantomLandmarks(phantom.sites, random_seed)};
 }
 
 InputMistakes Find(const Head& head) {

@@ -50,7 +50,7 @@ TEST(PhantomCt, BoneIsLostInABallAndNowhereElse) {
   const CtVolume whole = VoxelisePhantom(phantom, {.pixel_mm = 3, .slice_mm = 3}),
                  volume =
                      VoxelisePhantom(phantom, {.pixel_mm = 3, .slice_mm = 3, .defect = defect});
-  const LostBone ball(phantom, defect);
+  const LostBone ball(phantom.sites, defect);
   int lost = 0;
   for (int k = 0; k < volume.slices; ++k) {
     for (int j = 0; j < volume.rows; ++j) {

@@ -138,7 +138,7 @@ def run_with_expert(program, folder, landmarks):
 
 def make_phantom(program, folder):
     """A phantom's CT with slices 2 mm apart in its lower half, and 3 mm in the upper one."""
-    subprocess.run([program, "phantom", "--out", folder, *PHANTOM], check=True, stdout=subprocess.DEVNULL)
+    subprocess.run([program, "phantom", "--head", "smooth", "--out", folder, *PHANTOM], check=True, stdout=subprocess.DEVNULL)
     slices = sorted((folder / "ct").iterdir())
     half = len(slices) // 2
     for k, path in enumerate(slices):

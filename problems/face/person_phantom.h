@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A made-up person: a face drawn from the face model, with nose, lips, eyes, ears and neck, over a
+// skull at tissue depths drawn from people's. It is no one's head, and everything about it is
+// known.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "problems/io/volumes/ct_volume.h"
+#include "problems/subject/phantom.h"
+#include "problems/subject/phantom_ct.h"
+#include "surfaces/base/run_context.h"
+#include "surfaces/mesh/tri_mesh.h"
+
+namespace semblance::problems {
+
+struct PersonPhantom {
+  // The outer surface of the facial bone and of the front of the brain case, at least 2 mm under
+  // the skin; open at crown, back and throat. LPS, mm.
+  TriMesh skull;
+  TriMesh skin;               // the whole head, closed at the neck; lids and lips are open
+  TriMesh closing;            // a closed body that fills the openings of the lids and of the mouth
+  std::vector<TriMesh> eyes;  // the eyeballs, the right one first
+  // What a face is scored against: the skin, without the walls of those openings, and their
+  // closing.
+  TriMesh true_skin;
+  std::vector<PhantomSite> sites;  // as of Phantom; depths are those to the skin
+  double build = kNaN;             // standard deviations of tissue, over people
+};
+
+// Draws a person. The face has the modes of the ICT-FaceKit model with coefficients from N(0,1).
+// Independently of the face, depths at the sites come from the distribution of 54 adults
+// (CarriedPeople): one number for the build, and a rest that neighbours share. The mean skull, with
+// its modes drawn too, is then bent by a thin plate so that its sites lie at these depths under the
+// face, and its brain case under the scalp. So the skull and the face differ from the means
+// independently between the sites, as people's do from a table, and no method of this program has
+// made the truth. The same seed gives the same bytes for any number of threads. Throws Cancelled.
+PersonPhantom MakePersonPhantom(std::uint64_t random_seed, const RunContext& context);
+
+// A CT scan of the person (phantom_ct.h). Bone is a layer of options.bone_mm under the skull's
+// surface. Where that surface ends at crown and back, it continues as a layer of the same thickness
+// under the scalp.
+CtVolume VoxelisePerson(const PersonPhantom& person, const PhantomCtOptions& options);
+
+}  // namespace semblance::problems
