@@ -324,12 +324,57 @@ void FillWithAir(VoxelArray& array) {
   std::ranges::replace(array.values, kNoNumber, lowest);
 }
 
+// The differences of a slice from the one below it: their median, and the range of the middle half.
+struct SliceStep {
+  int median = 0, spread = 0;
+};
+
+SliceStep CompareWithSliceBelow(const VoxelArray& array, std::size_t slice) {
+  constexpr std::size_t kEnough = 4096;  // voxels; more would cost time in proportion
+  const std::size_t size = static_cast<std::size_t>(array.counts[0]) * array.counts[1];
+  std::vector<int> differences;
+  for (std::size_t n = 0; n < size; n += size / kEnough + 1) {
+    differences.push_back(array.values[slice * size + n] - array.values[(slice - 1) * size + n]);
+  }
+  const auto at = [&](std::size_t quarter) {
+    const auto place =
+        differences.begin() + static_cast<std::ptrdiff_t>(quarter * (differences.size() - 1) / 4);
+    std::ranges::nth_element(differences, place);
+    return *place;
+  };
+  return {.median = at(2), .spread = at(3) - at(1)};
+}
+
+// Notes slices between which most voxels, air and tissue alike, change by about the same amount: a
+// part of the slices has another offset. Anatomy changes some voxels much and most of them little.
+// Volumes without values of air in Hounsfield units are not checked.
+void NoteLevelSteps(const VoxelArray& array, std::vector<std::string>& notes) {
+  constexpr int kLeast = 60;  // HU; drifts of a scanner from slice to slice are below 10
+  constexpr int kAir = -500;
+  std::string found;
+  const int slices = std::ranges::min(array.values) <= kAir ? array.counts[2] : 0;
+  for (int k = 1; k < slices; ++k) {
+    const SliceStep step = CompareWithSliceBelow(array, static_cast<std::size_t>(k));
+    if (std::abs(step.median) >= kLeast && step.spread < std::abs(step.median)) {
+      found += fmt::format("{}slices {} and {} ({:+d})", found.empty() ? "" : ", ", k, k + 1,
+                           step.median);
+    }
+  }
+  if (!found.empty()) {
+    notes.push_back(
+        fmt::format("most values change by one amount between {}: a part of the slices has another "
+                    "offset, and bone and skin are then at wrong places; export the volume again",
+                    found));
+  }
+}
+
 VolumeReading Finish(VoxelArray array, VolumeReading reading, const std::string& where) {
   if (array.not_finite > 0) {
     FillWithAir(array);
   }
   std::vector<std::string> notes = array.notes;
   CheckValues(array, where, notes);
+  NoteLevelSteps(array, notes);
   reading.volume = ToCtVolume(std::move(array), where);
   NoteGeometry(reading.volume, reading.notes);
   CheckSkewness(reading.volume, where, reading.notes);

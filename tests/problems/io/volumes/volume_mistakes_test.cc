@@ -459,6 +459,21 @@ class MetaMistakesTest : public testing::VolumeFilesTest {
   }
 };
 
+// A range of slices whose values have another offset, as of a second series in one volume.
+TEST_F(MetaMistakesTest, APartOfTheSlicesWithAnotherOffsetIsNoted) {
+  const std::string header = Place() + "ElementSpacing = 2.5 2.5 3.5\n";
+  const auto noted = Contains(HasSubstr("most values change by one amount between"));
+  WriteMetaImage("a.mha", header);
+  EXPECT_THAT(Read("a.mha").notes, Not(noted));
+  const auto size = static_cast<std::size_t>(array_.counts[0]) * array_.counts[1];
+  for (std::size_t n = 8 * size; n < 12 * size; ++n) {
+    array_.values[n] = static_cast<std::int16_t>(array_.values[n] + 150);
+  }
+  WriteMetaImage("b.mha", header);
+  EXPECT_THAT(Read("b.mha").notes,
+              Contains(HasSubstr("slices 8 and 9 (+150), slices 12 and 13 (-150)")));
+}
+
 TEST_F(MetaMistakesTest, FieldsThatTheLibraryIgnoresAreReadOrRefused) {
   const std::string spacing = "ElementSpacing = 2.5 2.5 3.5\n";
   WriteMetaImage("a.mha", Place() + spacing);
