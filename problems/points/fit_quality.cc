@@ -151,6 +151,34 @@ std::string TailText(const FitResult& fit, std::string_view unit) {
              : "";
 }
 
+std::string WeightText(const GivenPoints& given, const FitResult& fit, std::string_view unit) {
+  // Points in each group; the weights must differ by the factor between the groups. True weights
+  // make the distances of heavy points the smaller ones; noise alone turns that into 1.3 at most.
+  constexpr std::size_t kFewest = 100;
+  constexpr double kFactor = 4, kRatio = 1.5;
+  const std::vector<double>& weights = given.weights;
+  if (given.has_sigma || weights.size() < 2 * kFewest) {
+    return "";
+  }
+  const auto split = std::ranges::minmax(weights);
+  const double middle = std::sqrt(split.min * split.max);
+  std::vector<double> light, heavy;
+  for (std::uint32_t k = 0; k < weights.size(); ++k) {
+    (weights[k] < middle ? light : heavy).push_back(fit.residual_mm[k]);
+  }
+  if (split.max < kFactor * split.min || light.size() < kFewest || heavy.size() < kFewest) {
+    return "";
+  }
+  const double light_mm = UpperMedian(light), heavy_mm = UpperMedian(heavy);
+  return heavy_mm > kRatio * light_mm
+             ? fmt::format(
+                   "points of great weight lie farther from the surface than those of small weight "
+                   "({} and {}, medians), and a great weight means an exact point; if the column "
+                   "holds standard deviations, name it sigma",
+                   LengthText(heavy_mm, unit, 3), LengthText(light_mm, unit, 3))
+             : "";
+}
+
 std::vector<std::string> PointFit::Faults() const {
   // Both limits are far beyond good fits and short of what nobody would use: a surface that follows
   // its points has a reach below 1, and points of one sheet lie within a few percent of it.

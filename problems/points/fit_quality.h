@@ -35,4 +35,8 @@ void CompareDistances(const GivenPoints& given, PointFit& result);
 // does, or if those are outliers.
 std::string TailText(const FitResult& fit, std::string_view unit);
 
+// States that points of great weight lie farther from the surface than those of small weight, as if
+// the weights were standard deviations; empty if they do not, or if a column sigma gave them.
+std::string WeightText(const GivenPoints& given, const FitResult& fit, std::string_view unit);
+
 }  // namespace semblance::problems

@@ -19,6 +19,7 @@
 #include <utility>
 
 #include "problems/io/manifest.h"
+#include "problems/points/column_mistakes.h"
 #include "surfaces/base/atomic_file.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
@@ -97,6 +98,7 @@ PointTable ParseXyz(std::string_view text, const std::string& name) {
     }
     table.positions.push_back(p);
   }
+  RefuseRowNumbers(table, further, name);
   if (further > 0) {
     table.notes.push_back(fmt::format(
         "{} after x, y and z without effect; a first line such as 'x y z red green blue' names "
@@ -149,9 +151,10 @@ std::string WithCommas(std::string_view text) {
 }
 
 // Turns semicolons between entries into commas, and decimal commas, if there are any, into points.
-std::string WithoutSemicolons(std::string_view text) {
+// rows: where the rows of numbers begin. Throws IoError for separators of thousands.
+std::string WithoutSemicolons(std::string_view text, std::size_t rows, const std::string& name) {
+  RefuseThousands(text.substr(rows), ";", name);
   std::string table(text);
-  const std::size_t rows = std::min(text.find('\n'), text.size());
   std::replace(table.begin() + static_cast<std::ptrdiff_t>(rows), table.end(), ',', '.');
   std::replace(table.begin(), table.end(), ';', ',');
   return table;
@@ -159,13 +162,13 @@ std::string WithoutSemicolons(std::string_view text) {
 
 // A table with semicolons or blanks between the entries, with commas in their place; nothing for a
 // table with commas.
-std::optional<std::string> AsCommaTable(const std::string& text) {
+std::optional<std::string> AsCommaTable(const std::string& text, const std::string& name) {
   const std::string_view first = FirstLine(text);
   if (first.find(',') != first.npos) {
     return std::nullopt;
   }
   if (first.find(';') != first.npos) {
-    return WithoutSemicolons(text);
+    return WithoutSemicolons(text, first.size(), name);
   }
   return NamesColumns(first) ? std::optional(WithCommas(text)) : std::nullopt;
 }
@@ -174,7 +177,7 @@ std::optional<std::string> AsCommaTable(const std::string& text) {
 // column is allowed, because other programs write such tables.
 PointTable ParseTable(const std::string& text, const std::string& name,
                       std::span<const std::string> attributes) {
-  const std::optional<std::string> table = AsCommaTable(text);
+  const std::optional<std::string> table = AsCommaTable(text, name);
   return table ? ParsePointTable(*table, name, attributes, FurtherColumns::kAny)
                : ParsePointTable(text, name, attributes);
 }
@@ -368,12 +371,20 @@ PointTable ParsePlyPoints(std::string_view bytes, const std::string& name,
 // blanks between them.
 PointTable ParseBare(const std::string& bytes, const std::string& name) {
   const std::string_view first = FirstLine(bytes);
-  std::string text = first.find(';') == first.npos ? bytes : WithoutSemicolons(bytes);
-  std::ranges::replace(text, ',', ' ');
+  std::string text = first.find(';') == first.npos ? bytes : WithoutSemicolons(bytes, 0, name);
+  const bool has_decimal_commas = HasDecimalCommas(first);
+  if (has_decimal_commas) {
+    RefuseThousands(bytes, " \t", name);
+  } else {
+    RefuseCommasWithin(bytes, name);
+  }
+  std::ranges::replace(text, ',', has_decimal_commas ? '.' : ' ');
   PointTable table = ParseXyz(text, name);
   table.first_line = 1;
-  table.notes.insert(table.notes.begin(),
-                     "the file names no columns: the first three are taken for x, y and z");
+  table.notes.insert(
+      table.notes.begin(),
+      fmt::format("the file names no columns: the first three are taken for x, y and z{}",
+                  has_decimal_commas ? "; its commas are read as decimal points" : ""));
   return table;
 }
 
@@ -625,6 +636,7 @@ PointFile ReadPointFile(const std::filesystem::path& path,
     file.points.first_line = IsTable(path) ? 2 : 0;
   }
   CheckReach(file.points);
+  RefuseWrongDegrees(file.points);
   WeldCorners(file.points);
   return file;
 }
@@ -647,7 +659,7 @@ std::vector<Vec2> ReadPlaces(const std::filesystem::path& path) {
     }
     return places;
   }
-  const std::optional<std::string> table = AsCommaTable(bytes);
+  const std::optional<std::string> table = AsCommaTable(bytes, name);
   return ParsePlaces(table ? *table : bytes, name);
 }
 

@@ -214,6 +214,9 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   if (std::string tail = TailText(result.fit, options.unit); !tail.empty()) {
     notes.push_back(std::move(tail));
   }
+  if (std::string text = WeightText(given, result.fit, options.unit); !text.empty()) {
+    notes.push_back(std::move(text));
+  }
   if (!result.attributes.empty()) {
     result.attributes = std::move(given_attributes);
   }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "problems/points/file_parts.h"
 #include "problems/report/plain_names.h"
 
 namespace semblance::problems {
@@ -63,6 +64,11 @@ std::vector<std::string> FindNotes(const PointTable& table, const PointsOut& out
   if (options.closure == Closure::kOpen) {
     if (std::string gap = GapText(placed.parameters.uv); !gap.empty()) {
       notes.push_back(std::move(gap));
+    }
+  }
+  if (placed.parameters.is_graph) {
+    for (std::string& note : FindHeightMistakes(table.positions, placed.parameters.uv)) {
+      notes.push_back(std::move(note));
     }
   }
   return notes;

@@ -122,7 +122,7 @@ std::string_view MapCoordinate(std::string_view name) {
 // The first line of a table, with the names that the reader knows.
 struct FirstLineNames {
   std::string line;
-  bool has_map_names = false;
+  bool has_map_names = false, has_degrees = false;
 };
 
 // Calls use(begin, end, name) for each column of the line, with its name in small letters and
@@ -150,6 +150,7 @@ FirstLineNames WithKnownNames(std::string_view first_line,
                               std::span<const std::string> attributes) {
   FirstLineNames names{std::string(first_line)};
   std::vector<std::string> taken(attributes.begin(), attributes.end());
+  bool longitude = false, latitude = false;
   ForEachName(first_line,
               [&](std::size_t, std::size_t, const std::string& name) { taken.push_back(name); });
   ForEachName(first_line, [&](std::size_t begin, std::size_t end, const std::string& name) {
@@ -159,11 +160,14 @@ FirstLineNames WithKnownNames(std::string_view first_line,
     if (!coordinate.empty() && !is_attribute && !is_taken(coordinate)) {
       taken.push_back(coordinate);
       names.has_map_names = true;
+      longitude = longitude || name.starts_with("lon");
+      latitude = latitude || name.starts_with("lat");
       names.line.replace(begin, end - begin, coordinate);
     } else if (std::ranges::find(kNames, std::string_view(name)) != kNames.end()) {
       names.line.replace(begin, end - begin, name);
     }
   });
+  names.has_degrees = longitude && latitude;
   return names;
 }
 
@@ -307,7 +311,8 @@ PointColumns ReadPointColumns(std::string_view first_line, std::string_view name
   PointColumns columns{.kinds = {},
                        .attributes = {attributes.begin(), attributes.end()},
                        .note = FurtherNote(found.further),
-                       .has_map_names = names.has_map_names};
+                       .has_map_names = names.has_map_names,
+                       .has_degrees = names.has_degrees};
   columns.kinds.assign(csv.Columns().size(), columns.Kinds());
   for (std::size_t k = 0; k < found.indices.size(); ++k) {
     if (found.indices[k]) {
@@ -340,6 +345,7 @@ PlainPoints::PlainPoints(PointColumns columns)
       values_(columns_.Kinds() + 1, 0.0) {
   table_.weights_of_sigma = has_sigma_;
   table_.has_map_columns = columns_.has_map_names;
+  table_.has_degrees = columns_.has_degrees;
   AddNote(columns_.note, table_);
   for (const std::string& attribute : columns_.attributes) {
     table_.attributes.push_back({attribute, {}});
@@ -424,6 +430,7 @@ PointTable ParsePointTable(std::string_view text, std::string_view name,
   FirstLineNames names = WithKnownNames(first_line, attributes);
   PointTable table = PointReader(names.line.append(rest), name, attributes, further).Read();
   table.has_map_columns = names.has_map_names;
+  table.has_degrees = names.has_degrees;
   return table;
 }
 

@@ -27,6 +27,7 @@ struct PointTable {
   std::vector<double> weights;             // > 0; one per point, or none
   bool weights_of_sigma = false;           // the weights are 1 / sigma^2
   bool has_map_columns = false;            // x, y or z has a name of maps, such as lon or depth
+  bool has_degrees = false;                // x is named as a longitude, and y as a latitude
   std::vector<PointAttribute> attributes;  // the requested ones, in the requested order
   std::vector<std::uint32_t> exact;        // ascending indices of points to be met exactly
   std::vector<Vec3> exact_normals;         // one per exact point; zero leaves the normal free
@@ -79,6 +80,7 @@ struct PointColumns {
   std::vector<std::string> attributes;
   std::string note = {};       // names the columns without effect; empty if there are none
   bool has_map_names = false;  // PointTable::has_map_columns
+  bool has_degrees = false;    // PointTable::has_degrees
 
   std::size_t Kinds() const { return kPointColumns + attributes.size(); }
   bool Has(PointColumn wanted) const;

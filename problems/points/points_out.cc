@@ -27,6 +27,32 @@ double InnerRange(std::span<const std::pair<double, std::size_t>> along) {
   return along.size() > 2 * outer ? along[along.size() - 1 - outer].first - along[outer].first : 0;
 }
 
+// Returns whether programs write this number for a missing one: 0, -99, 9999, -32768, 1e20. Another
+// number that many points share is a place, such as the height of a flat roof.
+bool StandsForNoData(double value) {
+  constexpr std::array kNumbers = {0.0, 99.0, 999.0, 9999.0, 99999.0, 999999.0, 32767.0, 32768.0};
+  constexpr double kHuge = 1e10;
+  return std::abs(value) >= kHuge || std::ranges::count(kNumbers, std::abs(value)) > 0;
+}
+
+// The heights without a number for missing ones that several points share at an end. Such a number
+// says nothing of the spread. One that half of the points have stays.
+Along WithoutNoData(Along along) {
+  const auto count_first = [](const Along& from) {
+    const auto other = std::ranges::find_if(
+        from, [&](const auto& entry) { return entry.first != from.front().first; });
+    const auto count = other - from.begin();
+    return count < 2 || 2 * count >= std::ssize(from) || !StandsForNoData(from.front().first)
+               ? 0
+               : count;
+  };
+  for (int end = 0; end < 2; ++end) {
+    along.erase(along.begin(), along.begin() + count_first(along));
+    std::ranges::reverse(along);
+  }
+  return along;
+}
+
 // The first of several points with one value beyond all others, such as -9999 or 0 for no data; the
 // size if there are none. widest: the widest inner range of the other axes.
 std::size_t FindOneValue(const Along& along, double widest) {
@@ -66,7 +92,7 @@ class StraySearch {
     // Spread of z relative to that of x and y. Lower values keep more points above the others.
     constexpr double kShareOfPlaces = 0.3;
     const std::size_t every = std::max<std::size_t>(positions_.size() / kSample, 1);
-    const double height = InnerRange(SortedAlong(2, every)),
+    const double height = InnerRange(WithoutNoData(SortedAlong(2, every))),
                  place =
                      std::max(InnerRange(SortedAlong(0, every)), InnerRange(SortedAlong(1, every)));
     units_.z() = height > 0 && place > 0 ? kShareOfPlaces * place / height : 1;

@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <cstdlib>
 #include <limits>
@@ -22,6 +23,7 @@
 namespace semblance::problems {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using testing::ScratchFolder;
 using testing::WordsOf;
@@ -332,6 +334,59 @@ TEST_F(PointFiles, ContentsOfAnotherFormatAreRefusedByName) {
   EXPECT_THAT(Refusal("a.ply", "ply\nformat ascii 1.0\nend_header\n"), HasSubstr("a.ply"));
   EXPECT_THAT(WordsOf<Error>([&] { ReadPointFile(folder_ / "missing.csv"); }),
               HasSubstr("missing.csv"));
+}
+
+// Whole numbers in steps of one before x, y and z are no x. Three columns alone are x, y and z.
+TEST_F(PointFiles, NumbersOfRowsBeforeTheCoordinatesAreRefused) {
+  const auto rows = [](double first, int columns) {
+    std::string text;
+    for (int k = 0; k < 20; ++k) {
+      text += fmt::format("{}", first + k);
+      for (int c = 1; c < columns; ++c) {
+        text += fmt::format(",{}", std::sin(k * c + 1.0));
+      }
+      text += "\n";
+    }
+    return text;
+  };
+  EXPECT_THAT(Refusal("a.csv", rows(0, 4)), HasSubstr("the first column counts from 0 to 19"));
+  EXPECT_THAT(Refusal("b.csv", rows(1.7e9, 5)), HasSubstr("in steps of 1"));
+  EXPECT_EQ(Read("c.csv", rows(0.5, 4)).positions.size(), 20u);
+  EXPECT_EQ(Read("d.csv", rows(0, 3)).positions.size(), 20u);
+}
+
+TEST_F(PointFiles, SeparatorsOfThousandsAreRefused) {
+  EXPECT_THAT(Refusal("a.csv", "x;y;z\n12,345;1;2\n678;3;4\n"),
+              AllOf(HasSubstr("column 1 has 12,345"), HasSubstr("separators of thousands")));
+  EXPECT_THAT(Refusal("b.csv", "x;y;z\n1;12.345;2\n3;-678;4\n"), HasSubstr("column 2"));
+  EXPECT_THAT(Refusal("c.txt", "1,000\t7,5\t2,5\n678\t3,5\t4,5\n"), HasSubstr("column 1"));
+  // Decimals of three digits, with a whole number among them or not.
+  EXPECT_EQ(Read("d.csv", "x;y;z\n12,345;1;2\n0,678;3;4\n5;6;7\n").positions[0].x(), 12.345);
+  EXPECT_EQ(Read("e.csv", "x;y;z\n12,345;1;2\n6,789;3;4\n").positions[0].x(), 12.345);
+}
+
+TEST_F(PointFiles, DecimalCommasWithoutNamesAreReadOrRefused) {
+  const PointTable table = Read("a.txt", "37,5\t44,25\t-1,125\n38,5\t44,5\t1,5\n");
+  EXPECT_EQ(table.positions[0], Vec3(37.5, 44.25, -1.125));
+  EXPECT_THAT(table.notes.front(), HasSubstr("commas are read as decimal points"));
+  EXPECT_EQ(Read("b.csv", "37,5;44,25;-1,125\n").positions[0], Vec3(37.5, 44.25, -1.125));
+  EXPECT_THAT(Refusal("c.csv", "37,074,44,25,-1,125\n38,5,44,5,1,5\n"),
+              HasSubstr("they look like three numbers with decimal commas"));
+  EXPECT_EQ(Read("d.csv", "37,74,44,25,1,125\n").positions[0], Vec3(37, 74, 44));
+}
+
+TEST_F(PointFiles, DegreesThatCannotBeRightAreRefused) {
+  EXPECT_THAT(Refusal("a.csv", "lat,lon,z\n100,5,1\n160,6,2\n"),
+              HasSubstr("latitudes go from 100 to 160, and end at 90 degrees"));
+  EXPECT_THAT(Refusal("b.csv", "lon,lat,z\n178,5,1\n179.5,6,2\n-179,5,1\n-178,6,2\n"),
+              AllOf(HasSubstr("-179 to -178 and at 178 to 179.5"),
+                    HasSubstr("add 360 to the negative longitudes")));
+  EXPECT_THAT(Refusal("c.csv", "lon;lat;z\n358;5;1\n359;6;2\n1;5;1\n2;6;2\n"),
+              HasSubstr("subtract 360"));
+  // All around the Earth, two places, and map coordinates in metres.
+  EXPECT_EQ(Read("d.csv", "lon,lat,z\n-179,5,1\n-60,6,2\n60,5,1\n179,6,2\n").positions.size(), 4u);
+  EXPECT_EQ(Read("e.csv", "lon,lat,z\n-80,5,1\n-79,6,2\n120,5,1\n").positions.size(), 3u);
+  EXPECT_EQ(Read("f.csv", "lon,lat,z\n500000,120,1\n500001,121,2\n").positions.size(), 2u);
 }
 
 }  // namespace

@@ -462,6 +462,85 @@ TEST(PointFit, StraysAreLeftOutAndListed) {
   }
 }
 
+// A number that stands for no data is left out, however many points have it.
+TEST(PointFit, ValuesForNoDataAreLeftOut) {
+  const PointTable hills = Hills(600, 60, 0.01, 3);
+  for (const double value : {-9999.0, -32768.0, -99.0, 1e20}) {
+    PointTable table = hills;
+    for (std::size_t k = 0; k < table.positions.size(); k += 10) {
+      table.positions[k].z() = value;
+    }
+    const PointFit fit = FitPoints(table, {}, {});
+    EXPECT_THAT(fit.strays, ::testing::SizeIs(60)) << value;
+    EXPECT_LT(fit.fit.point_rms_mm, 0.012) << value;
+  }
+}
+
+// A flat roof over rough ground is no missing height.
+TEST(PointFit, AHeightThatManyPointsShareStays) {
+  PointTable table = Hills(600, 60, 0.01, 3);
+  for (Vec3& p : table.positions) {
+    p.z() = p.x() < 15 ? 12.5 : 0.01 * p.z();
+  }
+  EXPECT_THAT(FitPoints(table, {}, {}).strays, ::testing::IsEmpty());
+}
+
+bool HasNote(const PointTable& table, const std::string& words) {
+  const PointFit fit = FitPoints(table, {}, {});
+  return ::testing::PrintToString(fit.notes).find(words) != std::string::npos;
+}
+
+TEST(PointFit, ZerosAmongHeightsAreNoted) {
+  constexpr char kWords[] = "0 may stand for a missing height";
+  PointTable gaps = Hills(600, 60, 0.01, 3), sea = gaps, rounded = gaps;
+  for (std::size_t k = 0; k < gaps.positions.size(); ++k) {
+    gaps.positions[k].z() = k % 15 == 0 ? 0 : gaps.positions[k].z() + 10;
+    sea.positions[k].z() = std::max(sea.positions[k].z(), 0.0);
+    rounded.positions[k].z() = std::round(rounded.positions[k].z());
+  }
+  EXPECT_TRUE(HasNote(gaps, kWords));
+  EXPECT_FALSE(HasNote(sea, kWords));
+  EXPECT_FALSE(HasNote(rounded, kWords));
+}
+
+// Two surveys of one area in one file, with other zeros of height.
+TEST(PointFit, APartOfTheFileWithAnotherZeroIsNoted) {
+  const PointTable hills = Hills(600, 60, 0.01, 3);
+  PointTable shifted = hills;
+  for (std::size_t k = 400; k < shifted.positions.size(); ++k) {
+    shifted.positions[k].z() += 5;
+  }
+  EXPECT_THAT(::testing::PrintToString(FitPoints(shifted, {}, {}).notes),
+              ::testing::ContainsRegex(
+                  "the first (39|40)[0-9] points lie (4[.][5-9]|5)[0-9.]* lower than"));
+  // One survey in the order of x, and a cliff between its halves.
+  PointTable sorted = hills;
+  std::ranges::sort(sorted.positions, {}, [](const Vec3& p) { return p.x(); });
+  EXPECT_FALSE(HasNote(sorted, "those behind them"));
+  for (Vec3& p : sorted.positions) {
+    p.z() += p.x() > 30 ? 5 : 0;
+  }
+  EXPECT_FALSE(HasNote(sorted, "those behind them"));
+}
+
+// A third of the points has ten times the standard deviation that is stated for the others.
+TEST(PointFit, StandardDeviationsAsWeightsAreNoted) {
+  constexpr char kWords[] = "points of great weight lie farther from the surface";
+  PointTable table = Hills(900, 60, 0.01, 3);
+  Random random(7);
+  std::vector<double> sigma;
+  for (std::size_t k = 0; k < table.positions.size(); ++k) {
+    sigma.push_back(k % 3 == 0 ? 1 : 0.1);
+    table.positions[k].z() += k % 3 == 0 ? random.Normal() : 0;
+  }
+  table.weights = sigma;
+  EXPECT_TRUE(HasNote(table, kWords));
+  std::ranges::transform(sigma, table.weights.begin(), [](double s) { return 1 / (s * s); });
+  EXPECT_FALSE(HasNote(table, kWords));
+  table.weights.assign(sigma.size(), 1);
+  EXPECT_FALSE(HasNote(table, kWords));
+}
+
 // The files of people that gave wrong results without a word: the RMS that is right, and a note.
 TEST(PointFit, FilesOfTheFieldGiveTheRightResult) {
   const std::filesystem::path folder = SEMBLANCE_SOURCE_DIR "/../shared/data/field";
