@@ -31,6 +31,10 @@ double SamePoint_mm(const Box3& extent);
 //   mandible        All sites of the mandible are in the air. Only a note if none is given, none is
 //                   listed as absent and no bone is near.
 //   in the air      A site is farther than max_distance_mm from the bone.
+//   reversed        A note: two sites lie the other way round than on the average skull, as if
+//                   their names were exchanged.
+//   asymmetry       A note: a pair is far from symmetric, or a site of the middle lies beside it.
+//   uneven depths   A note: the depths of left and right differ far more than those of people.
 //   proportions     A note: the skull is stretched along one axis.
 //   offset          A note: half of the sites lie more than 1 mm off the bone.
 // With fewer than six standard sites only `same point` and `in the air` are checked.

@@ -91,6 +91,12 @@ Landmark& At(Subject& s, const std::string& site) {
   return *std::ranges::find(s.file.landmarks, site, &Landmark::site);
 }
 
+// Moves a site and lays it on the bone again.
+void MoveAlongBone(Subject& s, const std::string& site, const Vec3& way) {
+  const Vec3 p = MeshQuery(s.skull).Closest(Vec3(At(s, site).point.data()) + way).position;
+  At(s, site).point = {p.x(), p.y(), p.z()};
+}
+
 TEST(LandmarkMistakes, ASoundSubjectHasNone) {
   for (const Subject& subject : Sound()) {
     EXPECT_THAT(Find(subject).errors, IsEmpty()) << subject.file.subject;
@@ -181,6 +187,47 @@ const Mistake kMistakes[] = {
      {"site g (Glabella) is 1", "mm from the skull, and at most 3 mm are allowed"},
      1},
 };
+
+// Pairs of neighbours in the middle plane. Most of these exchanges leave each within max_misfit_mm.
+TEST(LandmarkMistakes, NeighboursInExchangedOrderAreNoted) {
+  for (const auto& [one, two] : {std::pair("sg", "g"), std::pair("pr", "id"), std::pair("id", "sm"),
+                                 std::pair("sm", "pg"), std::pair("pg", "me")}) {
+    for (const char* head : {"cthead", "vhm"}) {
+      Subject subject = RealSubject(head);
+      std::swap(At(subject, one).point, At(subject, two).point);
+      const InputMistakes found = Find(subject);
+      const bool is_refused = !found.errors.empty();  // one is beyond max_misfit_mm
+      EXPECT_TRUE(is_refused ||
+                  std::ranges::any_of(found.notes,
+                                      [&](const std::string& note) {
+                                        return note.find(one) != note.npos &&
+                                               note.find("the other way round than on other") !=
+                                                   note.npos;
+                                      }))
+          << one << ", " << head;
+    }
+  }
+}
+
+// A site that was moved along the bone to one side, and along a cheek bone.
+TEST(LandmarkMistakes, ASiteBesideItsPlaceOnOneSideIsNoted) {
+  Subject chin = PhantomSubject(), cheek = PhantomSubject();
+  MoveAlongBone(chin, "pg", {12, 0, 0});
+  MoveAlongBone(cheek, "zy_l", {0, 16, 0});
+  EXPECT_THAT(Find(chin).notes,
+              ElementsAre(AllOf(HasSubstr("site pg"), HasSubstr("beside the middle of the head"))));
+  EXPECT_THAT(Find(cheek).notes,
+              ElementsAre(AllOf(HasSubstr("sites zy_l"), HasSubstr("from being mirror images"))));
+}
+
+TEST(LandmarkMistakes, DepthsInShiftedRowsAreNoted) {
+  Subject subject = RealSubject("cthead");
+  std::vector<Landmark>& landmarks = subject.file.landmarks;
+  for (std::size_t k = 0; k + 1 < landmarks.size(); ++k) {
+    landmarks[k].depth_along_normal_mm = landmarks[k + 1].depth_along_normal_mm;
+  }
+  EXPECT_THAT(Find(subject).notes, ElementsAre(HasSubstr("depths of left and right differ")));
+}
 
 TEST(LandmarkMistakes, EachHasItsMessage) {
   for (const Mistake& mistake : kMistakes) {
