@@ -37,10 +37,6 @@ Box3 Region(const RunResult& result) {
   return box;
 }
 
-RenderOptions PictureOptions(Lighting lighting) {
-  return {.width = kPictureWidth, .height = kPictureHeight, .lighting = lighting};
-}
-
 // The state that the sheets of one run share.
 struct Album {
   const RunResult& result;
@@ -49,20 +45,36 @@ struct Album {
   std::vector<Camera> cameras = CamerasFor(kViews, Region(result), kPictureAspect);
 };
 
-// Writes the scene from all sides. Returns its picture from the front.
-Image WriteSheet(const char* name, const Scene& scene, Lighting lighting, ShadowMaps& shadows,
-                 Album& album) {
-  std::vector<Image> sides =
-      RenderAll(scene, album.cameras, PictureOptions(lighting), shadows, album.threads);
-  album.folder.Write(name, EncodePng(ContactSheet(sides)));
-  return std::move(sides.front());
+// Writes the scene from all sides, a sheet per look. Returns the first one from the front.
+Image WriteSheets(std::span<const char* const> names, const Scene& scene,
+                  std::span<const Look> looks, Album& album) {
+  ShadowMaps shadows;
+  std::vector<std::vector<Image>> sheets =
+      RenderLooks(scene, looks, album.cameras, {.width = kPictureWidth, .height = kPictureHeight},
+                  shadows, album.threads);
+  for (std::size_t k = 0; k < sheets.size(); ++k) {
+    album.folder.Write(names[k], EncodePng(ContactSheet(sheets[k])));
+  }
+  return std::move(sheets.front().front());
+}
+
+Image WriteSheet(const char* name, const Scene& scene, Album& album) {
+  return WriteSheets({&name, 1}, scene, {{Look{}}}, album);
+}
+
+// The first object of a scene coloured by one value per vertex (MappedObject, pictures.h).
+Look MappedLook(std::span<const double> values_mm, const ColourMap& map) {
+  return {.lighting = Lighting::kEven,
+          .material = MatteMaterial(),
+          .vertex_colours = ColoursAt(map, values_mm)};
 }
 
 // Returns the head in the frame of the other pictures.
 Image HeadFromFront(const Album& album) {
   ShadowMaps shadows;
   return std::move(RenderAll(HeadScene(album.result), {album.cameras.data(), 1},
-                             PictureOptions(Lighting::kStudio), shadows, album.threads)
+                             {.width = kPictureWidth, .height = kPictureHeight}, shadows,
+                             album.threads)
                        .front());
 }
 
@@ -82,19 +94,6 @@ Colour StatusColour(SkinStatus status) {
   return HexColour(0xc8c0b8);
 }
 
-// Writes the mesh of the object from all sides, a sheet per colouring. Returns the first one from
-// the front.
-Image WriteColourings(std::span<const char* const> names, const SceneObject& object,
-                      std::span<const std::vector<Colour>> colourings, Lighting lighting,
-                      ShadowMaps& shadows, Album& album) {
-  std::vector<std::vector<Image>> sheets = RenderColourings(
-      {{object}}, colourings, album.cameras, PictureOptions(lighting), shadows, album.threads);
-  for (std::size_t k = 0; k < sheets.size(); ++k) {
-    album.folder.Write(names[k], EncodePng(ContactSheet(sheets[k])));
-  }
-  return std::move(sheets.front().front());
-}
-
 // Green: scored, yellow: masked, red: inner, blue: a lid, grey: the rest.
 std::vector<Colour> StatusColours(const ScoredSkin& skin) {
   std::vector<Colour> colours(skin.status.size());
@@ -104,33 +103,27 @@ std::vector<Colour> StatusColours(const ScoredSkin& skin) {
 
 // Returns the true skin from the front.
 Image WriteTruth(Album& album) {
-  const TriMesh& skin = *album.result.subject.skin;
   const TruthComparison& truth = *album.result.truth;
-  ShadowMaps shadows;
-  Image front =
-      WriteColourings({{"pictures/truth.png", "pictures/scored.png"}}, SkinObject(skin),
-                      {{{}, StatusColours(truth.skin)}}, Lighting::kStudio, shadows, album);
-  WriteSheet("pictures/error.png", {{MappedObject(skin, truth.face.signed_mm, ErrorColours())}},
-             Lighting::kEven, shadows, album);
-  return front;
+  return WriteSheets({{"pictures/truth.png", "pictures/scored.png", "pictures/error.png"}},
+                     {{SkinObject(*album.result.subject.skin)}},
+                     {{{},
+                       {.vertex_colours = StatusColours(truth.skin)},
+                       MappedLook(truth.face.signed_mm, ErrorColours())}},
+                     album);
 }
 
 // Returns the implicit surface from the front.
 Image WriteImplicit(Album& album) {
-  ShadowMaps shadows;
-  return WriteSheet("pictures/implicit.png", {{SkinObject(album.result.implicit.dense)}},
-                    Lighting::kStudio, shadows, album);
+  return WriteSheet("pictures/implicit.png", {{SkinObject(album.result.implicit.dense)}}, album);
 }
 
-// Writes skull and dowels, then the face over them. Returns the first from the front.
+// Writes skull and dowels, without and with the face over them. Returns the first from the front.
 Image WriteSkull(Album& album) {
-  Scene scene{
-      {SkullObject(album.result.subject.skull), DowelObject(album.result.subject.dowels_on_bone)}};
-  ShadowMaps shadows;
-  Image front = WriteSheet("pictures/skull_dowels.png", scene, Lighting::kStudio, shadows, album);
-  scene.objects.push_back(SkinObject(album.result.face.mesh, 0.55));
-  WriteSheet("pictures/face_over_skull.png", scene, Lighting::kStudio, shadows, album);
-  return front;
+  return WriteSheets(
+      {{"pictures/skull_dowels.png", "pictures/face_over_skull.png"}},
+      {{SkullObject(album.result.subject.skull), DowelObject(album.result.subject.dowels_on_bone),
+        SkinObject(album.result.face.mesh, 0.55)}},
+      {{{.shows_sheer = false}, {}}}, album);
 }
 
 // The way on the face from one (u,v) to another, a little above it. u may lead over the seam.
@@ -194,23 +187,19 @@ void WriteFit(Album& album) {
     }
   }
   scene.objects.push_back(SkinObject(result.face.mesh, 0.6));
-  ShadowMaps shadows;
-  WriteSheet("pictures/fit.png", scene, Lighting::kStudio, shadows, album);
+  WriteSheet("pictures/fit.png", scene, album);
 }
 
 // Writes the face, also by its sigma. Returns it from the front.
 Image WriteFace(Album& album) {
-  const RunResult& result = album.result;
-  const TriMesh& face = result.face.mesh;
-  ShadowMaps shadows;
-  Image front =
-      WriteSheet("pictures/face.png", {{SkinObject(face)}}, Lighting::kStudio, shadows, album);
-  const auto& uncertainty = result.uncertainty;
+  std::vector<const char*> names = {"pictures/face.png"};
+  std::vector<Look> looks(1);
+  const auto& uncertainty = album.result.uncertainty;
   if (uncertainty && !uncertainty->sigma_mm.empty()) {
-    WriteSheet("pictures/sigma.png", {{MappedObject(face, uncertainty->sigma_mm, SigmaColours())}},
-               Lighting::kEven, shadows, album);
+    names.push_back("pictures/sigma.png");
+    looks.push_back(MappedLook(uncertainty->sigma_mm, SigmaColours()));
   }
-  return front;
+  return WriteSheets(names, {{SkinObject(album.result.face.mesh)}}, looks, album);
 }
 
 }  // namespace

@@ -87,22 +87,23 @@ Mat3 ViewTowards(const Vec3& to_viewer) {
 
 ShadowMap RenderShadowMap(const ShadowMaps& all, const Vec3& to_light) {
   const int size = all.texels;
-  ShadowMap map{.projection = {.view_from_world = ViewTowards(to_light),
-                               .centre = all.box.center(),
-                               .samples_per_mm = 1 / all.Texel_mm(),
-                               .width = static_cast<double>(size),
-                               .height = static_cast<double>(size)},
-                .texels = size,
-                .depth = std::vector<float>(static_cast<std::size_t>(size) * size,
-                                            std::numeric_limits<float>::infinity())};
+  const Projection projection = {.view_from_world = ViewTowards(to_light),
+                                 .centre = all.box.center(),
+                                 .samples_per_mm = 1 / all.Texel_mm(),
+                                 .width = static_cast<double>(size),
+                                 .height = static_cast<double>(size)};
+  const Vec3 scale(projection.samples_per_mm, -projection.samples_per_mm, -1);
+  ShadowMap map{.to_light = to_light.cast<float>(),
+                .grid_from_mm = (scale.asDiagonal() * projection.view_from_world).cast<float>(),
+                .grid = DepthGrid(size, size)};
   std::vector<RasterPoint> points(all.casters.points.size());
   std::ranges::transform(all.casters.points, points.begin(),
-                         [&](const Vec3& p) { return map.projection * p; });
+                         [&](const Vec3& p) { return projection * p; });
   for (const auto& [a, b, c] : all.casters.triangles) {
-    VisitSamples(points[a], points[b], points[c], {0, size, 0, size}, [&](const Coverage& s) {
-      float& depth = map.depth[static_cast<std::size_t>(s.y) * size + s.x];
-      depth = std::min(depth, s.depth);
-    });
+    VisitFours(points[a], points[b], points[c], {0, size, 0, size},
+               [&](int x, int y, const FourFloats& depth, const FourInts& inside) {
+                 TakeNearer(depth, inside, &map.grid.depth[map.grid.Index(x, y)]);
+               });
   }
   return map;
 }
@@ -110,86 +111,102 @@ ShadowMap RenderShadowMap(const ShadowMaps& all, const Vec3& to_light) {
 // The properties of a material on which the light at its vertices depends.
 struct Matter {
   float wrap;
-  Eigen::Array4f per_mm2;  // 1 / scatter_mm^2 of red, green and blue
+  Rgb4 per_mm2;  // 1 / scatter_mm^2 of red, green and blue
 
   explicit Matter(const Material& material)
-      : wrap(static_cast<float>(material.wrap)), per_mm2(Eigen::Array4f::Zero()) {
+      : wrap(static_cast<float>(material.wrap)), per_mm2(Rgb4::Zero()) {
     per_mm2.head<3>() = material.scatter_mm.cast<float>().array().square().inverse();
   }
 
   // The share of each colour that passes `thickness_mm`: half at scatter_mm, falling with the
   // square of the thickness. A smooth stand-in for scattering below the skin.
-  Eigen::Array4f Transmitted(float thickness_mm) const {
+  Rgb4 Transmitted(float thickness_mm) const {
     return 1 / (1 + thickness_mm * thickness_mm * per_mm2);
   }
 };
 
-// The share of light that arrives, interpolated between the four texels around the point: 1 in the
+// A vertex as the lights meet it.
+struct LitPlace {
+  Eigen::Vector3f above = Eigen::Vector3f::Zero();  // mm, relative to the middle of the box
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+  float texel_mm = 0;
+
+  // Lies 1.5 texels above the surface, so that the surface does not shade itself.
+  LitPlace(const SceneVertex& vertex, const Vec3& middle, double texel)
+      : above((vertex.position - middle).cast<float>() +
+              static_cast<float>(1.5 * texel) * vertex.normal),
+        normal(vertex.normal),
+        texel_mm(static_cast<float>(texel)) {}
+};
+
+// The share of light that arrives, interpolated between the four texels around the place: 1 in the
 // open, towards 0 behind matter.
-Rgb LightThrough(const ShadowMap& map, const Vec3& p, const Matter& matter) {
-  const RasterPoint at = map.projection * p;
-  const float texel_mm = static_cast<float>(1 / map.projection.samples_per_mm);
-  const std::int32_t half = kSubsamples / 2;
-  const int x = (at.x - half) >> 8, y = (at.y - half) >> 8;
-  if (x < 0 || y < 0 || x + 1 >= map.texels || y + 1 >= map.texels) {
-    return Rgb::Ones();
+Rgb4 LightThrough(const ShadowMap& map, const LitPlace& place, const Matter& matter) {
+  const DepthGrid& grid = map.grid;
+  const Eigen::Vector3f at = map.grid_from_mm * place.above;
+  const float last_column = static_cast<float>(grid.columns - 1);
+  const float last_row = static_cast<float>(grid.rows - 1);
+  const float column = at[0] + 0.5F * last_column, row = at[1] + 0.5F * last_row;
+  if (!(column >= 0 && row >= 0 && column < last_column && row < last_row)) {
+    return Rgb4::Ones();
   }
-  const float fx = static_cast<float>((at.x - half) & 255) / kSubsamples;
-  const float fy = static_cast<float>((at.y - half) & 255) / kSubsamples;
-  Eigen::Array4f sum = Eigen::Array4f::Zero();
-  for (int k = 0; k < 4; ++k) {
-    const int dx = k & 1, dy = k >> 1;
-    const float weight = (dx != 0 ? fx : 1 - fx) * (dy != 0 ? fy : 1 - fy);
-    const float thickness = at.depth - map.depth[(y + dy) * map.texels + x + dx] - texel_mm;
-    sum += weight * (thickness > 0 ? matter.Transmitted(thickness) : Eigen::Array4f::Ones());
+  const int x = static_cast<int>(column), y = static_cast<int>(row);
+  const float fx = column - static_cast<float>(x), fy = row - static_cast<float>(y);
+  const float depth = at[2] - place.texel_mm;
+  const float *const upper = &grid.depth[grid.Index(x, y)], *const lower = upper + grid.stride;
+  const std::array<float, 4> thickness = {depth - upper[0], depth - upper[1], depth - lower[0],
+                                          depth - lower[1]};
+  if (std::max({thickness[0], thickness[1], thickness[2], thickness[3]}) <= 0) {
+    return Rgb4::Ones();
   }
-  return sum.head<3>();
+  const std::array<float, 4> weight = {(1 - fx) * (1 - fy), fx * (1 - fy), (1 - fx) * fy, fx * fy};
+  Rgb4 sum = Rgb4::Zero();
+  for (std::size_t k = 0; k < 4; ++k) {
+    sum += weight[k] * matter.Transmitted(std::max(thickness[k], 0.0F));
+  }
+  return sum;
 }
 
-// The share of one light that reaches the vertex, times its wrapped cosine.
-Rgb ShareOfLight(const Matter& matter, const SceneVertex& vertex, const Vec3& to_light,
-                 const ShadowMap& map, Rgb& through) {
-  const float wrapped =
-      (static_cast<float>(vertex.normal.dot(to_light)) + matter.wrap) / (1 + matter.wrap);
+// The share of one light that reaches the place, times its wrapped cosine. Leaves `through` as it
+// is if the surface faces away.
+Rgb4 ShareOfLight(const Matter& matter, const LitPlace& place, const ShadowMap& map,
+                  Rgb4& through) {
+  const float wrapped = (place.normal.dot(map.to_light) + matter.wrap) / (1 + matter.wrap);
   if (wrapped <= 0) {
-    return Rgb::Zero();
+    return Rgb4::Zero();
   }
-  // Starts 1.5 texels above the surface, so that the surface does not shade itself.
-  const Vec3 above = vertex.position + 1.5 / map.projection.samples_per_mm * vertex.normal;
-  through = LightThrough(map, above, matter);
+  through = LightThrough(map, place, matter);
   return wrapped * through;
 }
 
 using MapList = std::vector<const ShadowMap*>;
 
-SkyShare FindSkyShare(const Matter& matter, std::span<const Vec3> sky, const MapList& maps,
-                      const SceneVertex& vertex) {
-  SkyShare share{.sum = Rgb::Zero()};
-  for (std::size_t light = 0; light < sky.size(); ++light) {
-    const Vec3& direction = sky[light];
-    Rgb through;
-    const Rgb part = ShareOfLight(matter, vertex, direction, *maps[light], through);
+SkyShare FindSkyShare(const Matter& matter, const MapList& maps, const LitPlace& place) {
+  SkyShare share{.sum = Rgb4::Zero()};
+  for (const ShadowMap* map : maps) {
+    Rgb4 through;
+    const Rgb4 part = ShareOfLight(matter, place, *map, through);
     share.sum += part;
     for (int axis = 0; axis < 3; ++axis) {
-      share.along[axis] += static_cast<float>(direction[axis]) * part;
+      share.along[axis] += map->to_light[axis] * part;
     }
   }
   return share;
 }
 
 void LightVertex(const Matter& matter, const LightRig& rig, const MapList& maps,
-                 const SkyShare& sky, SceneVertex& vertex) {
-  vertex.light = rig.sky_level * sky.sum;
+                 const LitPlace& place, const SkyShare& sky, SceneVertex& vertex) {
+  Rgb4 of_sky = rig.sky_level * sky.sum;
   for (int axis = 0; axis < 3; ++axis) {
-    vertex.light += rig.sky_slope[axis] * sky.along[axis];
+    of_sky += rig.sky_slope[axis] * sky.along[axis];
   }
-  vertex.light *= rig.sky_colour;
+  vertex.light = of_sky.head<3>() * rig.sky_colour;
   float key_all = 0, key_seen = 0;
   for (std::size_t i = 0; i < rig.lights.size(); ++i) {
     const Light& light = rig.lights[i];
-    Rgb through = Rgb::Constant(-1);  // stays: the surface faces away
-    vertex.light +=
-        ShareOfLight(matter, vertex, light.to_light, *maps[i], through) * light.irradiance;
+    Rgb4 through = Rgb4::Constant(-1);  // stays: the surface faces away
+    const Rgb4 share = ShareOfLight(matter, place, *maps[i], through);
+    vertex.light += share.head<3>() * light.irradiance;
     if (light.is_key && through[1] >= 0) {
       key_all += 1;
       key_seen += through[1];
@@ -284,8 +301,8 @@ MapList FindMaps(std::span<const Vec3> to_light, int threads, ShadowMaps& maps) 
 
 }  // namespace
 
-void LightVertices(const Scene& scene, const LightRig& rig, int threads, ShadowMaps& maps,
-                   FlatScene& flat) {
+void LightVertices(const Scene& scene, std::span<const Material> materials, const LightRig& rig,
+                   int threads, ShadowMaps& maps, FlatScene& flat) {
   const Box3 box = BoundCasters(scene);
   if (maps.of_direction.empty()) {
     maps.box = box;
@@ -293,25 +310,24 @@ void LightVertices(const Scene& scene, const LightRig& rig, int threads, ShadowM
   } else if (maps.box.min() != box.min() || maps.box.max() != box.max()) {
     throw std::logic_error("shadows of a scene with other meshes");
   }
-  std::vector<Matter> matter;
-  for (const SceneObject& object : scene.objects) {
-    matter.emplace_back(object.material);
-  }
-  const std::array<Vec3, kSkyLights> sky = SkyDirections();
+  const std::vector<Matter> matter(materials.begin(), materials.end());
   std::vector<Vec3> moving(rig.lights.size());
   std::ranges::transform(rig.lights, moving.begin(), &Light::to_light);
-  const MapList of_sky = FindMaps(sky, threads, maps);
+  const MapList of_sky = FindMaps(SkyDirections(), threads, maps);
   const MapList of_lights = FindMaps(moving, threads, maps);
+  const Vec3 middle = maps.box.center();
+  const double texel_mm = maps.Texel_mm();
   flat.sky.resize(flat.vertices.size());
   ParallelFor(flat.vertices.size(), threads, 1024, [&](std::size_t v) {
     if (!flat.is_seen.empty() && !flat.is_seen[v]) {
       return;
     }
     const Matter& of_vertex = matter[flat.object_of_vertex[v]];
+    const LitPlace place(flat.vertices[v], middle, texel_mm);
     if (std::isnan(flat.sky[v].sum[0])) {
-      flat.sky[v] = FindSkyShare(of_vertex, sky, of_sky, flat.vertices[v]);
+      flat.sky[v] = FindSkyShare(of_vertex, of_sky, place);
     }
-    LightVertex(of_vertex, rig, of_lights, flat.sky[v], flat.vertices[v]);
+    LightVertex(of_vertex, rig, of_lights, place, flat.sky[v], flat.vertices[v]);
   });
 }
 

@@ -7,6 +7,7 @@
 #include <array>
 #include <cstdint>
 #include <map>
+#include <span>
 #include <vector>
 
 #include "problems/report/pictures/raster.h"
@@ -45,16 +46,19 @@ LightRig MakeLightRig(Lighting lighting, const Mat3& view_from_world);
 inline constexpr int kSkyLights = 26;
 std::array<Vec3, kSkyLights> SkyDirections();  // unit; spread evenly over the sphere
 
+// Red, green, blue and an unused fourth number, which make one register.
+using Rgb4 = Eigen::Array4f;
+
 // The shares of the sky's lights that a vertex receives, with their cosines: summed, and summed
 // times the direction along x, y and z. They give its light under any rig.
 struct SkyShare {
-  Rgb sum = Rgb::Constant(static_cast<float>(kNaN));  // NaN: not computed yet
-  std::array<Rgb, 3> along = {Rgb::Zero(), Rgb::Zero(), Rgb::Zero()};
+  Rgb4 sum = Rgb4::Constant(static_cast<float>(kNaN));  // NaN: not computed yet
+  std::array<Rgb4, 3> along = {Rgb4::Zero(), Rgb4::Zero(), Rgb4::Zero()};
 };
 
 struct SceneVertex {
-  Vec3 position;  // mm
-  Vec3 normal;    // unit, or zero
+  Vec3 position;                                     // mm
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();  // unit, or zero
   Rgb albedo = Rgb::Zero();
   Rgb light = Rgb::Zero();  // all lights, with shadows
   float key = 0;            // 0..1, the share of the key light that arrives
@@ -70,15 +74,16 @@ struct FlatScene {
   std::vector<SceneVertex> vertices;
   std::vector<SceneTriangle> triangles;
   std::vector<int> object_of_vertex;
-  std::vector<bool> is_seen;  // one per vertex; empty: all are seen
+  std::vector<char> is_seen;  // one per vertex; empty: all are seen
   std::vector<SkyShare> sky;  // one per vertex; empty: none is computed
 };
 
-// The depth of the nearest surface as seen from a light.
+// The depth of the nearest surface as seen from a light, on a square grid of texels.
 struct ShadowMap {
-  Projection projection;
-  int texels = 0;            // along a side
-  std::vector<float> depth;  // row by row; infinite where there is no surface
+  Eigen::Vector3f to_light = Eigen::Vector3f::Zero();      // unit
+  Eigen::Matrix3f grid_from_mm = Eigen::Matrix3f::Zero();  // column, row and depth of a place
+                                                           // relative to the middle of the box
+  DepthGrid grid;
 };
 
 // The shadow maps that several pictures of the same opaque meshes share.
@@ -95,8 +100,8 @@ struct ShadowMaps {
 
 // Sets light and key of every vertex that is seen, and its share of the sky if that is missing.
 // Only opaque objects cast shadows. Adds missing maps to `maps`. Throws std::logic_error if `maps`
-// belongs to other meshes.
-void LightVertices(const Scene& scene, const LightRig& rig, int threads, ShadowMaps& maps,
-                   FlatScene& flat);
+// belongs to other meshes. materials: one per object, in place of its own.
+void LightVertices(const Scene& scene, std::span<const Material> materials, const LightRig& rig,
+                   int threads, ShadowMaps& maps, FlatScene& flat);
 
 }  // namespace semblance::problems

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <cstring>
 #include <numbers>
 
 #include "problems/report/pictures/lighting.h"
@@ -19,6 +19,7 @@ namespace {
 
 constexpr int kBandRows = 16;  // pixel rows per task of a thread
 constexpr std::int64_t kHalfSample = kSubsamples / 2;
+constexpr int kMostSupersampling = 8;
 
 Rgb LinearColour(const Colour& c) {
   return {static_cast<float>(LinearFromSrgb(c.r)), static_cast<float>(LinearFromSrgb(c.g)),
@@ -59,7 +60,7 @@ void CheckObject(const SceneObject& object, std::size_t index) {
 
 void CheckOptions(const Camera& camera, const RenderOptions& o) {
   if (o.width < 1 || o.height < 1 || o.width > 8192 || o.height > 8192 || o.supersampling < 1 ||
-      o.supersampling > 8) {
+      o.supersampling > kMostSupersampling) {
     throw InputError(
         fmt::format("picture of {} x {} pixels with supersampling {}: sides must be 1 to 8192 and "
                     "supersampling 1 to 8",
@@ -73,23 +74,32 @@ void CheckOptions(const Camera& camera, const RenderOptions& o) {
 }
 
 // Per vertex of the object. colours: one per vertex, or none for the material's.
-std::vector<Rgb> LinearColours(const SceneObject& object, std::span<const Colour> colours) {
-  std::vector<Rgb> linear(object.mesh.points.size(), LinearColour(object.material.colour));
+std::vector<Rgb> LinearColours(const SceneObject& object, const Material& material,
+                               std::span<const Colour> colours) {
+  std::vector<Rgb> linear(object.mesh.points.size(), LinearColour(material.colour));
   std::ranges::transform(colours, linear.begin(), LinearColour);
   return linear;
 }
 
 FlatScene Flatten(const Scene& scene) {
   FlatScene flat;
+  std::size_t vertices = 0, triangles = 0;
+  for (const SceneObject& object : scene.objects) {
+    vertices += object.mesh.points.size();
+    triangles += object.mesh.triangles.size();
+  }
+  flat.vertices.reserve(vertices);
+  flat.triangles.reserve(triangles);
   for (std::size_t i = 0; i < scene.objects.size(); ++i) {
     const SceneObject& object = scene.objects[i];
     CheckObject(object, i);
     const auto base = static_cast<std::int32_t>(flat.vertices.size());
     const std::vector<Vec3> normals = VertexNormals(object.mesh);
-    const std::vector<Rgb> albedo = LinearColours(object, object.vertex_colours);
+    const std::vector<Rgb> albedo = LinearColours(object, object.material, object.vertex_colours);
     for (std::size_t v = 0; v < normals.size(); ++v) {
-      flat.vertices.push_back(
-          {.position = object.mesh.points[v], .normal = normals[v], .albedo = albedo[v]});
+      flat.vertices.push_back({.position = object.mesh.points[v],
+                               .normal = normals[v].cast<float>(),
+                               .albedo = albedo[v]});
     }
     for (const Triangle& t : object.mesh.triangles) {
       flat.triangles.push_back({{base + t[0], base + t[1], base + t[2]}, static_cast<int>(i)});
@@ -114,16 +124,19 @@ void SetPixel(Image& image, int x, int y, const Rgb& linear) {
 }
 
 struct Layer {
-  std::vector<float> depth;
-  std::vector<std::int32_t> triangle;  // index, or -1 for none
+  DepthGrid nearest;
+  std::vector<std::int32_t> triangle;  // at each sample: index, or -1 for none
 
-  explicit Layer(std::size_t samples = 0)
-      : depth(samples, std::numeric_limits<float>::infinity()), triangle(samples, -1) {}
-  void Offer(std::size_t sample, float sample_depth, std::int32_t index) {
-    if (sample_depth < depth[sample]) {
-      depth[sample] = sample_depth;
-      triangle[sample] = index;
-    }
+  Layer() = default;
+  Layer(int columns, int rows) : nearest(columns, rows), triangle(nearest.depth.size(), -1) {}
+
+  void Offer(int x, int y, const FourFloats& depth, const FourInts& inside, std::int32_t index) {
+    const std::size_t sample = nearest.Index(x, y);
+    const FourInts nearer = TakeNearer(depth, inside, &nearest.depth[sample]);
+    FourInts present;
+    std::memcpy(&present, &triangle[sample], sizeof(present));
+    present = nearer ? index : present;
+    std::memcpy(&triangle[sample], &present, sizeof(present));
   }
 };
 
@@ -131,16 +144,28 @@ struct Layers {
   Layer opaque, sheer;
 };
 
-// The data that all bands share, prepared once per picture. Bands are painted independently.
+// One per object.
+std::vector<Material> MaterialsOf(const Scene& scene, const Look& look) {
+  std::vector<Material> materials;
+  for (const SceneObject& object : scene.objects) {
+    materials.push_back(object.material);
+  }
+  if (look.material && !materials.empty()) {
+    materials.front() = *look.material;
+  }
+  return materials;
+}
+
+// The data that all bands and looks of a camera share. Bands are painted independently.
 class Painter {
  public:
-  // flat: the scene's. The painter sets its light and must be its only user.
-  Painter(const Scene& scene, const Camera& camera, const RenderOptions& options,
-          ShadowMaps& shadows, int threads, FlatScene& flat)
+  // flat: the scene's. The painter sets its light and must be its only user. Finds the visible
+  // triangles.
+  Painter(const Scene& scene, const Camera& camera, const RenderOptions& options, int threads,
+          FlatScene& flat)
       : scene_(scene),
         options_(options),
-        to_viewer_(camera.view_from_world.row(2)),
-        rig_(MakeLightRig(options.lighting, camera.view_from_world)),
+        view_from_world_(camera.view_from_world),
         flat_(flat),
         has_sheer_(std::ranges::any_of(scene.objects,
                                        [](const SceneObject& o) { return o.opacity < 1; })) {
@@ -151,7 +176,7 @@ class Painter {
                    .samples_per_mm = s * options.height / camera.height_mm,
                    .width = static_cast<double>(s) * options.width,
                    .height = static_cast<double>(s) * options.height};
-    SetHighlight();
+    ListSamples();
     points_.resize(flat_.vertices.size());
     ParallelFor(points_.size(), threads, 4096,
                 [&](std::size_t v) { points_[v] = projection_ * flat_.vertices[v].position; });
@@ -160,11 +185,22 @@ class Painter {
     ParallelFor(layers_.size(), threads, 1,
                 [&](std::size_t band) { layers_[band] = FindNearest(band); });
     MarkSeen();
-    LightVertices(scene, rig_, threads, shadows, flat_);
   }
 
   // Uses the present colours of the vertices.
-  Image Paint(int threads) const {
+  Image Paint(const Look& look, ShadowMaps& shadows, int threads) {
+    shows_sheer_ = has_sheer_ && look.shows_sheer;
+    const Lighting lighting = look.lighting.value_or(options_.lighting);
+    const bool is_lit = !materials_.empty() && lighting == lighting_ && !look.material &&
+                        !has_other_material_;  // by the look before
+    if (!is_lit) {
+      lighting_ = lighting;
+      has_other_material_ = look.material.has_value();
+      materials_ = MaterialsOf(scene_, look);
+      rig_ = MakeLightRig(lighting_, view_from_world_);
+      SetHighlight();
+      LightVertices(scene_, materials_, rig_, threads, shadows, flat_);
+    }
     Image image = MakeImage(options_.width, options_.height, Colour{});
     ParallelFor(layers_.size(), threads, 1, [&](std::size_t band) { PaintBand(band, image); });
     return image;
@@ -194,36 +230,36 @@ class Painter {
   Layers FindNearest(std::size_t band) const {
     const int columns = options_.supersampling * options_.width;
     const int first = FirstRow(band), end = EndRow(band);
-    const auto samples = static_cast<std::size_t>(columns) * (end - first);
-    Layers seen{Layer(samples), Layer(has_sheer_ ? samples : 0)};
+    Layers seen{Layer(columns, end - first), has_sheer_ ? Layer(columns, end - first) : Layer()};
     for (const std::int32_t t : triangles_of_band_[band]) {
       const auto& c = flat_.triangles[t].corners;
       const bool is_opaque = scene_.objects[flat_.triangles[t].object].opacity >= 1;
-      VisitSamples(points_[c[0]], points_[c[1]], points_[c[2]], {0, columns, first, end},
-                   [&](const Coverage& sample) {
-                     (is_opaque ? seen.opaque : seen.sheer)
-                         .Offer(static_cast<std::size_t>(sample.y - first) * columns + sample.x,
-                                sample.depth, t);
-                   });
+      Layer& layer = is_opaque ? seen.opaque : seen.sheer;
+      VisitFours(points_[c[0]], points_[c[1]], points_[c[2]], {0, columns, first, end},
+                 [&](int x, int y, const FourFloats& depth, const FourInts& inside) {
+                   layer.Offer(x, y - first, depth, inside, t);
+                 });
     }
     return seen;
   }
 
   void MarkCorners(std::int32_t triangle) {
     for (const std::int32_t corner : flat_.triangles[triangle].corners) {
-      flat_.is_seen[corner] = true;
+      flat_.is_seen[corner] = 1;
     }
   }
 
   // Marks the corners of visible triangles. Most of a head is hidden and needs no light.
   void MarkSeen() {
-    flat_.is_seen.assign(flat_.vertices.size(), false);
+    flat_.is_seen.assign(flat_.vertices.size(), 0);
     for (const Layers& layers : layers_) {
       for (const Layer* layer : {&layers.opaque, &layers.sheer}) {
+        std::int32_t last = -1;
         for (const std::int32_t t : layer->triangle) {
-          if (t >= 0) {
+          if (t != last && t >= 0) {
             MarkCorners(t);
           }
+          last = t;
         }
       }
     }
@@ -248,13 +284,16 @@ class Painter {
   // The direction half-way between viewer and key light (Blinn 1977). It is constant, because both
   // are far away.
   void SetHighlight() {
+    key_light_ = Rgb::Zero();
+    Vec3 half_way = Vec3::Zero();
     for (const Light& light : rig_.lights) {
       if (light.is_key) {
         key_light_ += light.irradiance;
-        half_way_ += light.to_light;
+        half_way += light.to_light;
       }
     }
-    half_way_ = (half_way_.normalized() + to_viewer_).normalized();
+    half_way_ =
+        (half_way.normalized() + view_from_world_.row(2).transpose()).normalized().cast<float>();
   }
 
   // The triangles that a sample shows; -1: none.
@@ -265,37 +304,59 @@ class Painter {
 
   Shown ShownAt(const Layers& seen, std::size_t sample) const {
     const auto& [opaque, sheer] = seen;
-    const bool in_front = has_sheer_ && sheer.depth[sample] < opaque.depth[sample];
+    const bool in_front =
+        shows_sheer_ && sheer.nearest.depth[sample] < opaque.nearest.depth[sample];
     return {opaque.triangle[sample], in_front ? sheer.triangle[sample] : -1};
+  }
+
+  // Lists the samples of a pixel, row by row.
+  void ListSamples() {
+    const int s = options_.supersampling;
+    for (int k = 0; k < s * s; ++k) {
+      samples_.push_back(
+          {.offset = static_cast<std::size_t>(k / s) * DepthGrid(s * options_.width, 0).stride +
+                     static_cast<std::size_t>(k % s),
+           .x = (2 * (k % s) + 1) * kHalfSample,
+           .y = (2 * (k / s) + 1) * kHalfSample});
+    }
   }
 
   // The mean over the samples of a pixel. Samples that show the same triangles are shaded once, at
   // their middle: in a fine mesh the four samples of a pixel seldom show four triangles.
   Rgb PixelLight(const Layers& seen, int first_row, int column, int row,
                  const Rgb& background) const {
-    const int s = options_.supersampling, columns = s * options_.width;
-    const std::size_t first = static_cast<std::size_t>(s * row - first_row) * columns + s * column;
-    const auto shown_at = [&](int k) {
-      return ShownAt(seen, first + static_cast<std::size_t>(k / s) * columns + k % s);
-    };
+    const int s = options_.supersampling;
+    const std::size_t first = seen.opaque.nearest.Index(s * column, s * row - first_row);
+    const std::int64_t left = s * column * std::int64_t{kSubsamples};
+    const std::int64_t top = s * row * std::int64_t{kSubsamples};
+    std::array<Shown, kMostSupersampling * kMostSupersampling> shown;
+    for (std::size_t k = 0; k < samples_.size(); ++k) {
+      shown[k] = ShownAt(seen, first + samples_[k].offset);
+    }
+    if (std::all_of(shown.begin() + 1, shown.begin() + samples_.size(),
+                    [&](const Shown& other) { return other == shown[0]; })) {
+      return Mix(shown[0], left + s * kHalfSample, top + s * kHalfSample, background);
+    }
     Rgb sum = Rgb::Zero();
     std::uint64_t done = 0;  // one bit per sample
-    for (int k = 0; k < s * s; ++k) {
-      const Shown shown = shown_at(k);
+    for (std::size_t k = 0; k < samples_.size(); ++k) {
       std::int64_t count = 0, x = 0, y = 0;
-      for (int other = k; other < s * s; ++other) {
-        if ((done >> other & 1) == 0 && (other == k || shown_at(other) == shown)) {
+      for (std::size_t other = k; other < samples_.size(); ++other) {
+        if ((done >> other & 1) == 0 && shown[other] == shown[k]) {
           done |= std::uint64_t{1} << other;
           ++count;
-          x += (2 * (s * column + other % s) + 1) * kHalfSample;
-          y += (2 * (s * row + other / s) + 1) * kHalfSample;
+          x += samples_[other].x;
+          y += samples_[other].y;
+        } else if (other == k) {
+          break;  // counted with an earlier sample
         }
       }
       if (count > 0) {
-        sum += static_cast<float>(count) * Mix(shown, x / count, y / count, background);
+        sum += static_cast<float>(count) *
+               Mix(shown[k], left + x / count, top + y / count, background);
       }
     }
-    return sum / static_cast<float>(s * s);
+    return sum / static_cast<float>(samples_.size());
   }
 
   // The colour at the place (x, y), in steps.
@@ -324,48 +385,55 @@ class Painter {
     const SceneTriangle& t = flat_.triangles[triangle];
     const Coverage at =
         CoverageAt(points_[t.corners[0]], points_[t.corners[1]], points_[t.corners[2]], x, y);
-    const SceneVertex surface = Interpolate(t, at);
+    const Surface surface = Interpolate(t, at);
     const SceneObject& object = scene_.objects[t.object];
     const Rgb light =
-        at.is_front ? Rgb(surface.albedo * surface.light +
-                          Highlight(object.material, surface.normal) * surface.key * key_light_)
-                    : Rgb(surface.albedo * LightInside(surface.normal));
+        at.is_front
+            ? Rgb(surface.albedo * surface.light +
+                  Highlight(materials_[t.object], surface.normal) * surface.key * key_light_)
+            : Rgb(surface.albedo * LightInside(surface.normal));
     Shaded shaded;
-    shaded.colour = options_.lighting == Lighting::kEven ? Rgb(light.min(1.0F)) : Shoulder(light);
+    shaded.colour = lighting_ == Lighting::kEven ? Rgb(light.min(1.0F)) : Shoulder(light);
     if (object.opacity < 1) {
-      const double cosine = std::clamp(std::abs(surface.normal.dot(to_viewer_)), 0.05, 1.0);
-      shaded.alpha = static_cast<float>(1 - std::pow(1 - object.opacity, 1 / cosine));
+      const float cosine = std::clamp(std::abs(surface.normal.dot(to_viewer_)), 0.05F, 1.0F);
+      shaded.alpha = 1 - std::pow(static_cast<float>(1 - object.opacity), 1 / cosine);
     }
     return shaded;
   }
 
-  SceneVertex Interpolate(const SceneTriangle& t, const Coverage& at) const {
+  struct Surface {
+    Eigen::Vector3f normal;
+    Rgb albedo, light;
+    float key = 0;
+  };
+
+  // The normal of a surface whose corners have none stays zero.
+  Surface Interpolate(const SceneTriangle& t, const Coverage& at) const {
     const SceneVertex& a = flat_.vertices[t.corners[0]];
     const SceneVertex& b = flat_.vertices[t.corners[1]];
     const SceneVertex& c = flat_.vertices[t.corners[2]];
-    const auto wa = static_cast<float>(at.a), wb = static_cast<float>(at.b);
-    const auto wc = static_cast<float>(at.c);
-    return {.position = at.a * a.position + at.b * b.position + at.c * c.position,
-            .normal = (at.a * a.normal + at.b * b.normal + at.c * c.normal).normalized(),
-            .albedo = wa * a.albedo + wb * b.albedo + wc * c.albedo,
-            .light = wa * a.light + wb * b.light + wc * c.light,
-            .key = wa * a.key + wb * b.key + wc * c.key};
+    constexpr float kLeastNorm2 = 1e-12F;
+    const Eigen::Vector3f normal = at.a * a.normal + at.b * b.normal + at.c * c.normal;
+    return {.normal = normal / std::sqrt(std::max(normal.squaredNorm(), kLeastNorm2)),
+            .albedo = at.a * a.albedo + at.b * b.albedo + at.c * c.albedo,
+            .light = at.a * a.light + at.b * b.light + at.c * c.light,
+            .key = at.a * a.key + at.b * b.key + at.c * c.key};
   }
 
-  float Highlight(const Material& material, const Vec3& normal) const {
-    double value = options_.lighting == Lighting::kEven ? 0 : std::max(0.0, normal.dot(half_way_));
+  float Highlight(const Material& material, const Eigen::Vector3f& normal) const {
+    float value = lighting_ == Lighting::kEven ? 0 : std::max(0.0F, normal.dot(half_way_));
     for (int i = 0; i < material.gloss_log2; ++i) {
       value *= value;
     }
-    return static_cast<float>(material.gloss * value);
+    return static_cast<float>(material.gloss) * value;
   }
 
   // The light on the back of a surface, seen through a hole: dimmed, without shadows.
-  Rgb LightInside(const Vec3& normal) const {
+  Rgb LightInside(const Eigen::Vector3f& normal) const {
     constexpr float kDimmed = 0.45F;  // dark enough to look like an inside
     Rgb sum = Rgb::Zero();
     const auto add = [&](const Vec3& to_light, const Rgb& irradiance) {
-      sum += static_cast<float>(std::max(0.0, -normal.dot(to_light))) * irradiance;
+      sum += static_cast<float>(std::max(0.0F, -normal.dot(to_light.cast<float>()))) * irradiance;
     };
     for (const Light& light : rig_.lights) {
       add(light.to_light, light.irradiance);
@@ -378,17 +446,27 @@ class Painter {
 
   const Scene& scene_;
   const RenderOptions& options_;
-  Vec3 to_viewer_;
-  LightRig rig_;
+  Mat3 view_from_world_;
+  Eigen::Vector3f to_viewer_ = view_from_world_.row(2).transpose().cast<float>();
   std::array<Vec3, kSkyLights> sky_ = SkyDirections();
   FlatScene& flat_;
   bool has_sheer_;
   Projection projection_;
-  Vec3 half_way_ = Vec3::Zero();
+  Eigen::Vector3f half_way_ = Eigen::Vector3f::Zero();
   Rgb key_light_ = Rgb::Zero();
+  struct Sample {
+    std::size_t offset = 0;     // in a layer, from the first sample of its pixel
+    std::int64_t x = 0, y = 0;  // from the upper left corner of its pixel, steps
+  };
+  std::vector<Sample> samples_;  // of a pixel
   std::vector<RasterPoint> points_;
   std::vector<std::vector<std::int32_t>> triangles_of_band_;
   std::vector<Layers> layers_;  // one per band
+  // Of the present look.
+  Lighting lighting_ = Lighting::kStudio;
+  bool shows_sheer_ = false, has_other_material_ = false;
+  std::vector<Material> materials_;  // one per object
+  LightRig rig_;
 };
 
 Vec3 DirectionToViewer(View view) {
@@ -449,33 +527,47 @@ Camera CameraFor(View view, const Box3& region, double aspect) {
 
 std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
                              const RenderOptions& options, ShadowMaps& shadows, int threads) {
-  std::vector<Image> images;
-  FlatScene flat = Flatten(scene);
-  for (const Camera& camera : cameras) {
-    images.push_back(Painter(scene, camera, options, shadows, threads, flat).Paint(threads));
-  }
-  return images;
+  return std::move(RenderLooks(scene, {{Look{}}}, cameras, options, shadows, threads).front());
 }
 
-std::vector<std::vector<Image>> RenderColourings(const Scene& scene,
-                                                 std::span<const std::vector<Colour>> colourings,
-                                                 std::span<const Camera> cameras,
-                                                 const RenderOptions& options, ShadowMaps& shadows,
-                                                 int threads) {
+namespace {
+
+// The colours of the first object's vertices.
+std::vector<Rgb> FirstAlbedo(const Scene& scene, const Look& look) {
+  if (scene.objects.empty()) {
+    return {};
+  }
+  const SceneObject& first = scene.objects.front();
+  const std::vector<Colour>& colours =
+      look.vertex_colours ? *look.vertex_colours : first.vertex_colours;
+  CheckColours(first, colours.size(), 0);
+  return LinearColours(first, look.material.value_or(first.material), colours);
+}
+
+}  // namespace
+
+std::vector<std::vector<Image>> RenderLooks(const Scene& scene, std::span<const Look> looks,
+                                            std::span<const Camera> cameras,
+                                            const RenderOptions& options, ShadowMaps& shadows,
+                                            int threads) {
   FlatScene flat = Flatten(scene);
   std::vector<std::vector<Rgb>> albedos;
-  for (const std::vector<Colour>& colours : colourings) {
-    CheckColours(scene.objects.at(0), colours.size(), 0);
-    albedos.push_back(LinearColours(scene.objects[0], colours));
+  for (const Look& look : looks) {
+    albedos.push_back(FirstAlbedo(scene, look));
   }
-  std::vector<std::vector<Image>> images(colourings.size());
+  // The light of the sky depends on materials: entry 0 is for looks that change none.
+  std::vector<std::vector<SkyShare>> skies(looks.size() + 1);
+  std::vector<std::vector<Image>> images(looks.size());
   for (const Camera& camera : cameras) {
-    const Painter painter(scene, camera, options, shadows, threads, flat);
-    for (std::size_t k = 0; k < albedos.size(); ++k) {
+    Painter painter(scene, camera, options, threads, flat);
+    for (std::size_t k = 0; k < looks.size(); ++k) {
       for (std::size_t v = 0; v < albedos[k].size(); ++v) {
         flat.vertices[v].albedo = albedos[k][v];
       }
-      images[k].push_back(painter.Paint(threads));
+      std::vector<SkyShare>& sky = skies[looks[k].material ? k + 1 : 0];
+      flat.sky.swap(sky);
+      images[k].push_back(painter.Paint(looks[k], shadows, threads));
+      flat.sky.swap(sky);
     }
   }
   return images;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -100,13 +101,20 @@ Image Render(const Scene& scene, const Camera& camera, const RenderOptions& opti
 // Later calls with the same opaque meshes reuse them through `shadows` (lighting.h).
 std::vector<Image> RenderAll(const Scene& scene, std::span<const Camera> cameras,
                              const RenderOptions& options, ShadowMaps& shadows, int threads);
-// Renders the scene once per colouring and camera: result[colouring][camera]. A colouring gives the
-// vertex colours of the first object in place of its own, or none for its material's. Light and
-// hidden surfaces, which take most of the time, are computed once for all colourings.
-std::vector<std::vector<Image>> RenderColourings(const Scene& scene,
-                                                 std::span<const std::vector<Colour>> colourings,
-                                                 std::span<const Camera> cameras,
-                                                 const RenderOptions& options, ShadowMaps& shadows,
-                                                 int threads);
+// One way to show a scene.
+struct Look {
+  std::optional<Lighting> lighting = {};  // none: that of the options
+  // Take the place of the first object's. An empty list of colours: the material's colour.
+  std::optional<Material> material = {};
+  std::optional<std::vector<Colour>> vertex_colours = {};
+  bool shows_sheer = true;  // false: objects with an opacity below 1 are left out
+};
+
+// Renders the scene once per look and camera: result[look][camera]. The visible surfaces and the
+// shadows, which take most of the time, are found once for all looks.
+std::vector<std::vector<Image>> RenderLooks(const Scene& scene, std::span<const Look> looks,
+                                            std::span<const Camera> cameras,
+                                            const RenderOptions& options, ShadowMaps& shadows,
+                                            int threads);
 
 }  // namespace semblance::problems

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <numbers>
 #include <stdexcept>
+#include <utility>
+#include <vector>
 
 #include "problems/report/pictures/lighting.h"
 #include "problems/report/pictures/pictures.h"
@@ -116,34 +118,59 @@ TEST(Render, FewVerticesNeedFewTexels) {
   EXPECT_LT(sum / static_cast<double>(few.rgb.size()), 1);
 }
 
-TEST(Render, ColouringsAgreeWithScenesOfTheseColours) {
+// Every look gives the bytes of a scene of its own, whichever look comes before it.
+TEST(Render, LooksAgreeWithScenesOfTheirOwn) {
   Scene scene = Crowd();
-  std::vector<Colour> reds(scene.objects[0].mesh.points.size());
+  SceneObject& first = scene.objects[0];
+  std::vector<Colour> reds(first.mesh.points.size());
   for (std::size_t v = 0; v < reds.size(); ++v) {
     reds[v] = {static_cast<double>(v) / static_cast<double>(reds.size()), 0, 0};
   }
-  const std::vector<std::vector<Colour>> colourings = {reds, {}};
+  const std::vector<Look> looks = {
+      {.vertex_colours = reds},
+      {},
+      {.lighting = Lighting::kEven, .material = MatteMaterial(), .vertex_colours = reds},
+      {.material = SkinMaterial()},
+      {.lighting = Lighting::kEven},
+      {.vertex_colours = std::vector<Colour>()}};
   const std::array cameras = {FrontCamera(90), FrontCamera(50)};
   const RenderOptions options{.width = 90, .height = 80};
   ShadowMaps shadows;
-  const std::vector<std::vector<Image>> images =
-      RenderColourings(scene, colourings, cameras, options, shadows, 2);
-  ASSERT_EQ(images.size(), 2u);
-  for (std::size_t k = 0; k < images.size(); ++k) {
-    scene.objects[0].vertex_colours = colourings[k];
+  const auto images = RenderLooks(scene, looks, cameras, options, shadows, 2);
+  ASSERT_EQ(images.size(), looks.size());
+  const SceneObject own = first;
+  for (std::size_t k = 0; k < looks.size(); ++k) {
+    RenderOptions alone = options;
+    alone.lighting = looks[k].lighting.value_or(options.lighting);
+    first.material = looks[k].material.value_or(own.material);
+    first.vertex_colours = looks[k].vertex_colours.value_or(own.vertex_colours);
     for (std::size_t n = 0; n < cameras.size(); ++n) {
-      EXPECT_EQ(images[k].at(n).rgb, Render(scene, cameras[n], options, 1).rgb) << k << " " << n;
+      EXPECT_EQ(images[k].at(n).rgb, Render(scene, cameras[n], alone, 1).rgb) << k << " " << n;
     }
   }
   EXPECT_NE(images[0][0].rgb, images[1][0].rgb);
+  EXPECT_NE(images[1][0].rgb, images[3][0].rgb);
 }
 
-TEST(Render, AColouringHasOneColourPerVertexOrNone) {
-  const std::vector<std::vector<Colour>> colourings = {std::vector<Colour>(3)};
+TEST(Render, ALookCanLeaveOutWhatIsSheer) {
+  Scene scene{{Square(10, 0, {0, 1, 0}), Square(20, -5, {1, 0, 0}, 0.5)}};
+  const Camera camera = FrontCamera(60);
+  ShadowMaps shadows;
+  const auto images =
+      RenderLooks(scene, {{{}, {.shows_sheer = false}, {}}}, {&camera, 1}, Plain(), shadows, 1);
+  EXPECT_EQ(images[0][0].rgb, Render(scene, camera, Plain(), 1).rgb);
+  EXPECT_EQ(images[2][0].rgb, images[0][0].rgb);
+  scene.objects.pop_back();
+  EXPECT_EQ(images[1][0].rgb, Render(scene, camera, Plain(), 1).rgb);
+  EXPECT_NE(images[1][0].rgb, images[0][0].rgb);
+}
+
+TEST(Render, ALookHasOneColourPerVertexOrNone) {
+  const Look look{.vertex_colours = std::vector<Colour>(3)};
   const Camera camera = FrontCamera(60);
   ShadowMaps shadows;
   EXPECT_THROW(
-      RenderColourings({{Square(10, 0, kBlack)}}, colourings, {&camera, 1}, Plain(), shadows, 1),
+      RenderLooks({{Square(10, 0, kBlack)}}, {&look, 1}, {&camera, 1}, Plain(), shadows, 1),
       InputError);
 }
 
@@ -249,22 +276,55 @@ TEST(Render, NearerSurfacesHideFartherOnesInAnyOrder) {
   ExpectColour(Centre(Render({{far, near}}, FrontCamera(40), Plain(), 1)), {1, 0, 0});
 }
 
-TEST(Raster, CoverageAtAgreesWithVisitSamples) {
-  const RasterPoint a{300, 200, 1.5F}, b{4100, 900, 2.5F}, c{1500, 3700, -1};
-  int count = 0;
-  VisitSamples(a, b, c, {0, 32, 0, 32}, [&](const Coverage& sample) {
-    const Coverage alone = CoverageAt(a, b, c, kSubsamples * sample.x + kSubsamples / 2,
-                                      kSubsamples * sample.y + kSubsamples / 2);
-    ++count;
-    EXPECT_EQ(alone.x, sample.x);
-    EXPECT_EQ(alone.y, sample.y);
-    EXPECT_EQ(alone.a, sample.a);
-    EXPECT_EQ(alone.b, sample.b);
-    EXPECT_EQ(alone.c, sample.c);
-    EXPECT_EQ(alone.depth, sample.depth);
-    EXPECT_EQ(alone.is_front, sample.is_front);
-  });
-  EXPECT_GT(count, 50);
+// The samples are those whose barycentric coordinates are not negative, and the depth is the mean
+// that these weigh, for small and large triangles in both orders of corners.
+TEST(Raster, FoursAgreeWithCoverageAt) {
+  constexpr int kSide = 96;
+  for (const int grow : {1, 2, 5}) {  // 5: beyond kNarrow
+    for (const bool swapped : {false, true}) {
+      const RasterPoint a{300 * grow, 200 * grow, 1.5F};
+      RasterPoint b{4100 * grow, 900 * grow, 2.5F}, c{1500 * grow, 3700 * grow, -1};
+      if (swapped) {
+        std::swap(b, c);
+      }
+      std::vector<float> seen(kSide * (kSide + 3), -100);
+      VisitFours(a, b, c, {1, kSide, 2, kSide},
+                 [&](int x, int y, const auto& depth, const auto& inside) {
+                   for (int lane = 0; lane < 4; ++lane) {
+                     if (inside[lane] != 0) {
+                       seen[y * (kSide + 3) + x + lane] = depth[lane];
+                     }
+                   }
+                 });
+      int count = 0;
+      for (int y = 2; y < kSide; ++y) {
+        for (int x = 1; x < kSide; ++x) {
+          const Coverage at = CoverageAt(a, b, c, kSubsamples * x + kSubsamples / 2,
+                                         kSubsamples * y + kSubsamples / 2);
+          const bool is_inside = std::min({at.a, at.b, at.c}) >= -1e-6F;
+          const float expected =
+              is_inside ? at.a * a.depth + at.b * b.depth + at.c * c.depth : -100.0F;
+          EXPECT_NEAR(seen[y * (kSide + 3) + x], expected, 1e-4) << x << " " << y;
+          EXPECT_EQ(at.is_front, swapped);
+          count += is_inside ? 1 : 0;
+        }
+      }
+      EXPECT_GT(count, 50);
+    }
+  }
+}
+
+TEST(Raster, TheNearerDepthStays) {
+  DepthGrid grid(2, 2);
+  for (const float depth : {3.0F, 1.0F, 2.0F}) {
+    VisitFours({0, 0, depth}, {512, 0, depth}, {0, 512, depth}, {0, 2, 0, 2},
+               [&](int x, int y, const auto& offered, const auto& inside) {
+                 TakeNearer(offered, inside, &grid.depth[grid.Index(x, y)]);
+               });
+  }
+  EXPECT_EQ(grid.depth[grid.Index(0, 0)], 1);
+  EXPECT_EQ(grid.depth[grid.Index(1, 0)], 1);  // on the edge
+  EXPECT_TRUE(std::isinf(grid.depth[grid.Index(1, 1)]));
 }
 
 TEST(Render, NeighbouringTrianglesLeaveNoHole) {
