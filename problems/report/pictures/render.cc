@@ -462,7 +462,7 @@ class Painter {
   std::vector<RasterPoint> points_;
   std::vector<std::vector<std::int32_t>> triangles_of_band_;
   std::vector<Layers> layers_;  // one per band
-  // Of the present look.
+  // The present look sets these.
   Lighting lighting_ = Lighting::kStudio;
   bool shows_sheer_ = false, has_other_material_ = false;
   std::vector<Material> materials_;  // one per object
