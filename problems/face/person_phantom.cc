@@ -97,7 +97,7 @@ TriMesh MiddleOfFace(const HSplineSurface& surface) {
   return Submesh(face.mesh, keep);
 }
 
-// The triangles of a mesh of which no point is nearer than tolerance_mm to the other mesh.
+// The triangles whose centre is further than tolerance_mm from the other mesh.
 std::vector<bool> AwayFrom(const TriMesh& mesh, const MeshQuery& other, double tolerance_mm) {
   std::vector<bool> away;
   for (const Triangle& t : mesh.triangles) {
@@ -421,7 +421,7 @@ class BoneLayers {
     const double below = (from_mm + bone_mm_ - depth_mm) / voxel_mm_;
     return std::clamp(0.5 + std::min(above, below), 0.0, 1.0);
   }
-  // Where the mean skull may end: above the forehead, and behind the ears down to the height of the
+  // The mean skull may end above the forehead, and behind the ears down to the height of the
   // occipital bone.
   bool IsVault(const Vec3& p) const {
     const Vec3 from_nasion = p - nasion_;

@@ -22,7 +22,7 @@ struct PersonPhantom {
   TriMesh skin;               // the whole head, closed at the neck; lids and lips are open
   TriMesh closing;            // a closed body that fills the openings of the lids and of the mouth
   std::vector<TriMesh> eyes;  // the eyeballs, the right one first
-  // What a face is scored against: the skin, without the walls of those openings, and their
+  // A face is scored against this: the skin, without the walls of those openings, and their
   // closing.
   TriMesh true_skin;
   std::vector<PhantomSite> sites;  // as of Phantom; depths are those to the skin
@@ -30,16 +30,18 @@ struct PersonPhantom {
 };
 
 // Draws a person. The face has the modes of the ICT-FaceKit model with coefficients from N(0,1).
-// Independently of the face, depths at the sites come from the distribution of 54 adults
-// (CarriedPeople): one number for the build, and a rest that neighbours share. The mean skull, with
-// its modes drawn too, is then bent by a thin plate so that its sites lie at these depths under the
-// face, and its brain case under the scalp. So the skull and the face differ from the means
-// independently between the sites, as people's do from a table, and no method of this program has
-// made the truth. The same seed gives the same bytes for any number of threads. Throws Cancelled.
+// Independently of the face, depths at the sites come from a distribution of people: means and
+// deviations of the T-Table 2023, or of 54 adults (CarriedPeople) at sites that it lacks, one
+// number for the build with the loadings of the 54, and a rest that neighbours share. The mean
+// skull, with its modes drawn too, is then bent by a thin plate so that its sites lie at these
+// depths under the face, and its brain case under the scalp. So the skull and the face differ from
+// the means independently between the sites, as people's do from a table, and no method of this
+// program has made the truth. The same seed gives the same bytes for any number of threads. Throws
+// Cancelled.
 PersonPhantom MakePersonPhantom(std::uint64_t random_seed, const RunContext& context);
 
 // A CT scan of the person (phantom_ct.h). Bone is a layer of options.bone_mm under the skull's
-// surface. Where that surface ends at crown and back, it continues as a layer of the same thickness
+// surface. That surface ends at crown and back; there the bone is a layer of the same thickness
 // under the scalp.
 CtVolume VoxelisePerson(const PersonPhantom& person, const PhantomCtOptions& options);
 

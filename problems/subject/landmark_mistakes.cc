@@ -265,7 +265,7 @@ class MistakeSearch {
   // Two sites that lie the other way round than on the average skull, by more than half of their
   // distance there. The names of sites nearer than max_misfit_mm may be exchanged without one of
   // them being far off. In 400 heads of the modes of the mean skull, with errors of 3 mm per
-  // coordinate, one pair was as far turned; without errors none was, and the three heads of
+  // coordinate, two pairs were as far turned; without errors none was, and the three heads of
   // configs/landmarks are far from it.
   void NoteReversedSites() {
     constexpr double kNearest_mm = 10, kReversed = -0.6;
