@@ -259,8 +259,8 @@ class ObjBust : public ::testing::Test {
   std::map<std::string, std::string> Files() const {
     const BustModel model = Model();
     std::map<std::string, std::string> files;
-    for (const NamedBytes& file :
-         BustToFiles({.skin = model.mesh, .eyes = {}, .subject_from_model = {}}, model)) {
+    for (const NamedBytes& file : BustToFiles(
+             {.skin = model.mesh, .eyes = {}, .eyeballs = {}, .subject_from_model = {}}, model)) {
       EXPECT_TRUE(files.emplace(file.name, file.bytes).second) << file.name;
     }
     return files;
@@ -295,7 +295,7 @@ TEST_F(ObjBust, KeepsItsLinesMaterialsAndTextures) {
   WriteObj("mtllib head.mtl\no head\n",
            "vt 0 0\nvt 1 0\nvt 1 1\nvn 0 0 1\nusemtl face\nf 1/1/1 2/2/1 3/3/1 4/1/1\n");
   const BustModel model = Model();
-  Bust bust{.skin = model.mesh, .eyes = {}, .subject_from_model = {}};
+  Bust bust{.skin = model.mesh, .eyes = {}, .eyeballs = {}, .subject_from_model = {}};
   bust.skin.points[2] = {2, 3, 0.5};
   const auto files = BustToFiles(bust, model);
   ASSERT_EQ(files.size(), 4u);
