@@ -211,8 +211,9 @@ struct DrawnSkull {
   }
 };
 
-// The mean direction of the bone round a vertex.
-Vec3 BoneAround(const SkullShell& shell, const Vec3& p) {
+// Returns whether a point of the shell, and the bone around it, face within acos(least_cosine) of a
+// direction. Thin bone has a second side within the radius, so the mean alone would not tell.
+bool Faces(const SkullShell& shell, const Vec3& p, const Vec3& direction, double least_cosine) {
   constexpr double kRadius_mm = 5;  // wider than the bone at a rim is thick
   Vec3 sum = Vec3::Zero();
   for (std::size_t v = 0; v < shell.mesh.points.size(); ++v) {
@@ -220,24 +221,22 @@ Vec3 BoneAround(const SkullShell& shell, const Vec3& p) {
       sum += shell.surface.vertex_normals()[v];
     }
   }
-  return sum.normalized();
+  const Vec3 own = shell.surface.NormalAt(shell.surface.query().Closest(p));
+  return std::min(sum.normalized().dot(direction), own.dot(direction)) > least_cosine;
 }
 
-// The vertex of the shell that stands for a site. At rims of thin bone it is not the nearest one,
-// but one a few mm away, where the bone faces as it does at that site on people.
+// The point of the shell that stands for a site: the nearest one where the bone faces as it does at
+// that site on people. At rims of thin bone that is a few mm away; else it is the nearest of all.
 Vec3 PlaceSite(const SitePoint& site, const SkullShell& shell) {
   constexpr double kReach_mm = 8;  // more moves the site off its place, less leaves it on a rim
+  constexpr double kLeastCosine = 0.8;  // 37 degrees
   const Vec3 usual = AverageDirection(site.site);
   Vec3 best = shell.surface.query().Closest(site.point).position;
-  double most = -2;
+  double nearest_mm = Faces(shell, best, usual, kLeastCosine) ? 0 : kReach_mm;
   for (const Vec3& p : shell.mesh.points) {
-    const double away = (p - site.point).norm() / kReach_mm;
-    if (away >= 1) {
-      continue;
-    }
-    const double worth = BoneAround(shell, p).dot(usual) - away * away;
-    if (worth > most) {
-      most = worth;
+    const double away_mm = (p - site.point).norm();
+    if (away_mm < nearest_mm && Faces(shell, p, usual, kLeastCosine)) {
+      nearest_mm = away_mm;
       best = p;
     }
   }
@@ -350,7 +349,7 @@ void MeasureSites(const DrawnSkull& drawn, PersonPhantom& person) {
     const Vec3 outward = AverageDirection(site.code);
     const Vec3 normal = SuggestedDirection(base, outward, bone);
     const std::optional<MeshPoint> hit = skin.FirstHit(base, normal, kReach_mm);
-    if (hit && BoneAround(shell, base).dot(normal) > least_cosine &&
+    if (hit && Faces(shell, base, normal, least_cosine) &&
         SuggestionFault(base, outward, bone).empty()) {
       person.sites.push_back({site.code, base, normal, hit->distance_mm});
     }
