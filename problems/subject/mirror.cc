@@ -300,7 +300,9 @@ std::vector<std::string> PrepareMirrored(const MirrorOptions& options, TriMesh& 
                     options.least_cm2));
   }
   if (!added.empty()) {
-    notes.push_back(fmt::format("sites {} are mirrored with it", fmt::join(added, ", ")));
+    notes.push_back(
+        fmt::format("the points of sites {} are mirrored with it, their measured depths are not",
+                    fmt::join(added, ", ")));
   }
   skull = std::move(mirrored.mesh);
   origin = std::move(mirrored.origin);

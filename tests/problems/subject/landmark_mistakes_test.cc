@@ -88,7 +88,11 @@ void SwapSides(Subject& s) {
 }
 
 Landmark& At(Subject& s, const std::string& site) {
-  return *std::ranges::find(s.file.landmarks, site, &Landmark::site);
+  const auto found = std::ranges::find(s.file.landmarks, site, &Landmark::site);
+  if (found == s.file.landmarks.end()) {
+    throw std::out_of_range("the head lacks the site " + site);
+  }
+  return *found;
 }
 
 // Moves a site and lays it on the bone again.
@@ -194,6 +198,9 @@ TEST(LandmarkMistakes, NeighboursInExchangedOrderAreNoted) {
                                  std::pair("sm", "pg"), std::pair("pg", "me")}) {
     for (const char* head : {"cthead", "vhm"}) {
       Subject subject = RealSubject(head);
+      if (!subject.file.Find(one) || !subject.file.Find(two)) {
+        continue;  // vhm lacks pg
+      }
       std::swap(At(subject, one).point, At(subject, two).point);
       const InputMistakes found = Find(subject);
       const bool is_refused = !found.errors.empty();  // one is beyond max_misfit_mm

@@ -165,8 +165,9 @@ TEST(PrepareMirrored, NotesInventedBoneAndMirrorsTheLandmarkThere) {
   EXPECT_EQ(skull.points, before.points);
   const auto notes = PrepareMirrored({.missing = true}, skull, origin, file, 1);
   EXPECT_THAT(notes, Contains(HasSubstr("cm² of bone that the left side lacks are mirrored")));
-  EXPECT_THAT(notes,
-              Contains(HasSubstr("sites im_l are mirrored with it")));  // go_l: bone is there
+  EXPECT_THAT(
+      notes,
+      Contains(HasSubstr("the points of sites im_l are mirrored with it")));  // go_l: bone is there
   EXPECT_EQ(origin.size(), skull.triangles.size());
   EXPECT_THAT(file.absent, IsEmpty());
   const auto found = std::ranges::find(file.landmarks, std::string("im_l"), &Landmark::site);
