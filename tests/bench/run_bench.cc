@@ -81,7 +81,8 @@ void MeasureImports(const fs::path& folder) {
   std::vector<CallCost> costs;
   for (const std::string pixel : {"1", "0.5"}) {
     const std::string out = (folder / ("phantom_" + pixel)).string();
-    CallProgram({"phantom", "--head", "smooth", "--out", out, "--pixel-mm", pixel, "--slice-mm", pixel, "--force"});
+    CallProgram({"phantom", "--head", "smooth", "--out", out, "--pixel-mm", pixel, "--slice-mm",
+                 pixel, "--force"});
     costs.push_back(
         MedianCall({"import-ct", out + "/ct", "--out", out + "/import", "--force", "--quiet"}));
     fs::remove_all(out);

@@ -59,8 +59,9 @@ void WriteHead(const fs::path& folder, std::uint64_t random_seed, bool with_land
   WriteFileAtomically(folder / "skull.ply", EncodeMesh(phantom.skull, ".ply"));
   WriteFileAtomically(folder / "skin.ply", EncodeMesh(phantom.face, ".ply"));
   if (with_landmarks) {
-    WriteFileAtomically(folder / "landmarks.yaml",
-                        EncodeLandmarks(PhantomLandmarks(phantom.sites, random_seed), "landmarks.yaml"));
+    WriteFileAtomically(
+        folder / "landmarks.yaml",
+        EncodeLandmarks(PhantomLandmarks(phantom.sites, random_seed), "landmarks.yaml"));
   }
 }
 
