@@ -327,9 +327,9 @@ class Painter {
                  const Rgb& background) const {
     const int s = options_.supersampling;
     const std::size_t first = seen.opaque.nearest.Index(s * column, s * row - first_row);
-    const std::int64_t left = s * column * std::int64_t{kSubsamples};
-    const std::int64_t top = s * row * std::int64_t{kSubsamples};
-    std::array<Shown, kMostSupersampling * kMostSupersampling> shown;
+    const std::int64_t left = std::int64_t{kSubsamples} * s * column;
+    const std::int64_t top = std::int64_t{kSubsamples} * s * row;
+    std::array<Shown, std::size_t{kMostSupersampling} * kMostSupersampling> shown;
     for (std::size_t k = 0; k < samples_.size(); ++k) {
       shown[k] = ShownAt(seen, first + samples_[k].offset);
     }
