@@ -139,7 +139,7 @@ def without_outliers_by(table, names, head):
 
 
 def scatter(names, depths, table):
-    """The least, median and largest scatter of the heads' depths over a table's means, as factors."""
+    """Scatter and level of the heads' depths over a table's means, as factors: the least, the median and the largest."""
     text = open(table).read()
     means = {site: float(mean) for site, mean in re.findall(r'site: "?(\w+)"?\n.*\n.*\n +adult: \{mean: ([\d.]+)', text)}
     own = [k for k, name in enumerate(names) if name.split("_")[0] in means]
@@ -147,7 +147,8 @@ def scatter(names, depths, table):
     logs = logs[(~np.isnan(logs)).sum(axis=1) >= 10]
     off = np.minimum(np.abs(logs - np.nanmedian(logs, axis=1, keepdims=True)), 1.3)  # one wrong depth counts as 3.7 times
     factors = np.exp(np.sqrt(np.nanmean(off**2, axis=1)))
-    print(f"{len(factors)} heads: {factors.min():.2f}, median {np.median(factors):.2f}, {factors.max():.2f}")
+    for name, values in (("scatter", factors), ("level", np.exp(np.nanmedian(logs, axis=1)))):
+        print(f"{name} of {len(values)} heads: {values.min():.2f}, median {np.median(values):.2f}, {values.max():.2f}")
 
 
 def main():

@@ -16,7 +16,7 @@
 #include "problems/app/exit_code.h"
 #include "problems/app/work_options.h"
 #include "problems/config/terminal_text.h"
-#include "problems/face/person_phantom.h"
+#include "problems/face/person_scan.h"
 #include "problems/io/output_folder.h"
 #include "problems/io/staged_folder.h"
 #include "problems/io/volumes/itk_files.h"

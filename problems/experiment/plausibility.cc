@@ -16,8 +16,8 @@
 #include <optional>
 #include <utility>
 
-#include "problems/face/prior_observations.h"
 #include "problems/subject/sites.h"
+#include "problems/subject/tissue_table.h"
 #include "surfaces/base/json_text.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/quantile.h"

@@ -7,13 +7,15 @@
 #include <cstdint>
 #include <vector>
 
-#include "problems/io/volumes/ct_volume.h"
 #include "problems/subject/phantom.h"
-#include "problems/subject/phantom_ct.h"
 #include "surfaces/base/run_context.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance::problems {
+
+// Tissue over the brain case, from bone to the surface of the skin. Chosen near that of the
+// formula's vault and not drawn, because no marker stands there.
+inline constexpr double kPersonScalp_mm = 5.5;
 
 struct PersonPhantom {
   // The outer surface of the facial bone and of the front of the brain case, at least 2 mm under
@@ -39,10 +41,5 @@ struct PersonPhantom {
 // program has made the truth. The same seed gives the same bytes for any number of threads. Throws
 // Cancelled.
 PersonPhantom MakePersonPhantom(std::uint64_t random_seed, const RunContext& context);
-
-// A CT scan of the person (phantom_ct.h). Bone is a layer of options.bone_mm under the skull's
-// surface. That surface ends at crown and back; there the bone is a layer of the same thickness
-// under the scalp.
-CtVolume VoxelisePerson(const PersonPhantom& person, const PhantomCtOptions& options);
 
 }  // namespace semblance::problems

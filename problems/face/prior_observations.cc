@@ -7,11 +7,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
-#include <string_view>
 
 #include "fitting/problem/placement.h"
 #include "interp/dowels/dowel.h"
+#include "problems/subject/tissue_table.h"
 #include "surfaces/base/error.h"
 #include "surfaces/base/parallel.h"
 #include "surfaces/mesh/mesh_query.h"
@@ -19,24 +20,9 @@
 namespace semblance::problems {
 namespace {
 
-// The means and deviations of configs/tables/t_table_2023.yaml, of the standard sites.
-const std::map<std::string, PublishedDepth, std::less<>>& TTable() {
-  static const std::map<std::string, PublishedDepth, std::less<>> table = {
-      {"g", {5.5, 1}},   {"n", {6, 1.5}},   {"rhi", {3, 1}},    {"mp", {11.5, 2.5}},
-      {"pr", {12, 3}},   {"id", {13.5, 3}}, {"sm", {11, 2}},    {"pg", {11, 2.5}},
-      {"me", {7, 2.5}},  {"mso", {7, 2}},   {"mio", {6.5, 3}},  {"zy", {7.5, 3}},
-      {"go", {12.5, 6}}, {"sM2", {26, 7}},  {"iM2", {22, 6.5}}, {"mr", {19.5, 5}}};
-  return table;
-}
-
 constexpr double kMeanShareOfDepth = 0.29;  // mean of sd / depth over the sites of that table
 
 }  // namespace
-
-std::optional<PublishedDepth> FindPublishedDepth(std::string_view site) {
-  const auto found = TTable().find(WithoutSide(site));
-  return found != TTable().end() ? std::optional(found->second) : std::nullopt;
-}
 
 double PublishedSd_mm(const Dowel& dowel) {
   if (std::isfinite(dowel.sd_mm)) {

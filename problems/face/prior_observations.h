@@ -4,10 +4,8 @@
 #pragma once
 
 #include <map>
-#include <optional>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "fitting/problem/fit_target.h"
@@ -47,13 +45,6 @@ void Fields(Visitor& visit, TableDepthOptions& o) {
                          "fat person do; it widens sigma and moves no face"},
         o.shared);
 }
-
-// The depth at a site of the T-Table 2023 (Hona & Stephan 2024, adults pooled).
-struct PublishedDepth {
-  double mean_mm = kNaN, sd_mm = kNaN;
-};
-// Nothing if the table lacks the site, whose code may be with or without side.
-std::optional<PublishedDepth> FindPublishedDepth(std::string_view site);
 
 // The standard deviation of the dowel's depth among people. If its table states none, it is that of
 // the T-Table 2023 at its site (Hona & Stephan 2024, adults pooled). If the T-Table lacks the site,

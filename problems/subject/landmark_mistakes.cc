@@ -14,6 +14,7 @@
 #include "problems/subject/average_skull.h"
 #include "problems/subject/mandible.h"
 #include "problems/subject/sites.h"
+#include "problems/subject/tissue_table.h"
 #include "surfaces/base/quantile.h"
 
 namespace semblance::problems {
@@ -63,6 +64,7 @@ class MistakeSearch {
         NoteReversedSites();
         NoteAsymmetry();
         NoteUnevenDepths();
+        NoteDepthLevel();
         NoteProportions();
       }
       NoteOffset();
@@ -331,6 +333,32 @@ class MistakeSearch {
                       "pairs), and those of people by at most 1.35; look whether each depth stands "
                       "at its own site: rows may be shifted",
                       label_, UpperMedian(factors), factors.size()));
+    }
+  }
+
+  // Depths that were all halved, doubled or scaled, which JudgeFace's depth_factor lets pass. 69
+  // heads on which depths were measured have median factors of 0.66 to 1.75
+  // (docs/explanation/plausibility.md).
+  void NoteDepthLevel() {
+    constexpr double kLeastFactor = 0.6, kMostFactor = 1.9;
+    constexpr std::size_t kFewest = 10;  // depths; fewer differ this much by chance
+    std::vector<double> factors;
+    for (const Landmark& landmark : file_.landmarks) {
+      const auto published = FindPublishedDepth(landmark.site);
+      if (published && landmark.depth_along_normal_mm > 0.0) {
+        factors.push_back(*landmark.depth_along_normal_mm / published->mean_mm);
+      }
+    }
+    if (factors.size() < kFewest) {
+      return;
+    }
+    const double factor = UpperMedian(factors);
+    if (factor < kLeastFactor || factor > kMostFactor) {
+      found_.notes.push_back(fmt::format(
+          "{}: the depths are {:.2f} times the published means (median of {}), and those "
+          "of people 0.66 to 1.75 times; look whether all depths are scaled or in "
+          "another unit",
+          label_, factor, factors.size()));
     }
   }
 

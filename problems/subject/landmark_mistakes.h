@@ -35,6 +35,7 @@ double SamePoint_mm(const Box3& extent);
 //                   their names were exchanged.
 //   asymmetry       A note: a pair is far from symmetric, or a site of the middle lies beside it.
 //   uneven depths   A note: the depths of left and right differ far more than those of people.
+//   depth level     A note: the depths are far smaller or larger than those of people.
 //   proportions     A note: the skull is stretched along one axis.
 //   offset          A note: half of the sites lie more than 1 mm off the bone.
 // With fewer than six standard sites only `same point` and `in the air` are checked.

@@ -214,4 +214,11 @@ std::vector<std::string> UnorderedLandmarks(const TissueTable& table, Sex sex,
 // published tables contain such rows and cells.
 std::vector<std::string> TableWarnings(const TissueTable& table);
 
+// The depth at a site of the T-Table 2023 (Hona & Stephan 2024, adults pooled).
+struct PublishedDepth {
+  double mean_mm = kNaN, sd_mm = kNaN;
+};
+// Nothing if the table lacks the site, whose code may be with or without side.
+std::optional<PublishedDepth> FindPublishedDepth(std::string_view site);
+
 }  // namespace semblance::problems

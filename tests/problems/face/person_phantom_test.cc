@@ -10,7 +10,8 @@
 #include <optional>
 #include <vector>
 
-#include "problems/face/prior_observations.h"
+#include "problems/face/person_scan.h"
+#include "problems/subject/tissue_table.h"
 #include "surfaces/mesh/mesh_query.h"
 
 namespace semblance::problems {

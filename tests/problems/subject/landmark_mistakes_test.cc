@@ -236,6 +236,18 @@ TEST(LandmarkMistakes, DepthsInShiftedRowsAreNoted) {
   EXPECT_THAT(Find(subject).notes, ElementsAre(HasSubstr("depths of left and right differ")));
 }
 
+TEST(LandmarkMistakes, DepthsThatAreAllScaledAreNoted) {
+  for (const auto& [head, factor] : {std::pair("cthead", 0.5), std::pair("vhm", 2.0)}) {
+    Subject subject = RealSubject(head);
+    for (Landmark& landmark : subject.file.landmarks) {
+      if (landmark.depth_along_normal_mm) {
+        *landmark.depth_along_normal_mm *= factor;
+      }
+    }
+    EXPECT_THAT(Find(subject).notes, ElementsAre(HasSubstr("times the published means")));
+  }
+}
+
 TEST(LandmarkMistakes, EachHasItsMessage) {
   for (const Mistake& mistake : kMistakes) {
     for (Subject subject : Sound()) {
