@@ -11,6 +11,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
+#include "surfaces/mesh/refine_mesh.h"
 
 namespace semblance::problems {
 namespace {
@@ -319,13 +320,16 @@ FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const T
   for (const auto& [part, enclosed] : volume.parts) {
     metrics.region_volumes[kFaceParts[part]] = enclosed;
   }
-  const std::vector<bool> over = FaceOverScoredSkin(outer, region, outer_query, face, context);
+  // On triangles of 5 mm the sum over the face's vertices is off by 0.02 mm; finer ones cost time.
+  constexpr double kMeanEdge_mm = 3;
+  const TriMesh fine = RefineTo(face, kMeanEdge_mm);
+  const std::vector<bool> over = FaceOverScoredSkin(outer, region, outer_query, fine, context);
   // These distances are seen from the face. The truth lies outside the face if the face lies inside
   // the truth, so the sign turns.
   std::vector<double> back =
-      FindNearest(face, VertexNormals(face), over, outer_query, context).signed_mm;
+      FindNearest(fine, VertexNormals(fine), over, outer_query, context).signed_mm;
   std::transform(back.begin(), back.end(), back.begin(), [](double d) { return -d; });
-  const std::vector<Sample> here = TakeSamples(back, VertexAreas(face), any);
+  const std::vector<Sample> here = TakeSamples(back, VertexAreas(fine), any);
   metrics.face_to_truth = Summarize(here);
   metrics.symmetric = Summarize(EvenlyWeighted(there, here));
   metrics.hausdorff_mm = std::fmax(metrics.truth_to_face.max_mm, metrics.face_to_truth.max_mm);
