@@ -211,7 +211,7 @@ def read_marks(text):
     return [Mark(site, triple(point), triple(normal), float(depth)) for site, point, normal, depth in found]
 
 
-RINGS = 50  # triangles of some 4 mm: their size moves a refined mesh's face by 0.01 mm
+RINGS = 50  # edges of 5 mm, which the program refines; finer meshes take more time per case
 # A phantom's nasal bones may lie deeper than those of people: 8.1 mm are 5.1 standard deviations.
 FACE = {"title": "a face", "plausibility": {"depth_sds": 7}, "implicit": {"resolution": 60, "target_triangles": 4000}, "seeds": {"level": 1}, "first_fit": [],
         "template": {"type": "formula", "patches_u": 8, "patches_v": 8, "max_level": 2}, "uncertainty": {"sigma": False},
