@@ -7,9 +7,9 @@ import pathlib
 import warnings
 
 from . import _semblance
-from .errors import InputError
+from .errors import InputError, IoError
 from .options import option_text
-from .plugins import Scheme, load_plugins
+from .plugins import Metric, Scheme, load_plugins
 from .results import Result
 
 
@@ -62,11 +62,15 @@ def run(config, set=None, out=None, force: bool = False, threads: int = 1, schem
         Numbers, surface and meshes.
     """
     overrides = [f"{path}={option_text(value)}" for path, value in (set or {}).items()]
-    parts = _semblance.run(os.fspath(config), overrides, None if out is None else os.fspath(out), force, threads, list(schemes))
+    out = None if out is None else os.fspath(out)
+    try:
+        parts = _semblance.run(_file(config), overrides, out, force, threads, _own(schemes, Scheme))
+    except IoError as error:
+        raise IoError(str(error).replace("add --force", "pass force=True")) from None
     return Result(json.loads(parts["numbers"]), parts["arrays"], parts["faults"], parts["page"])
 
 
-def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = ""):
+def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "", wide: bool = False):
     """Run the unfinished trials of a study, or read the table of a finished one.
 
     Parameters
@@ -82,27 +86,33 @@ def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "")
         Your own, in addition to those of the files under `plugins` of the study.
     only : str
         Condition for the trials to run, as of `semblance study --only`.
+    wide : bool
+        Whether a row of the table is a trial with all its metrics. Otherwise it is one metric of one trial, in the
+        columns `metric` and `value`, and there are hundreds of rows per trial.
 
     Returns
     -------
     pandas.DataFrame or list of dict
-        trials.csv in long form; a DataFrame if pandas is installed. A warning counts the trials that failed in this call.
+        trials_wide.csv or trials.csv; a DataFrame if pandas is installed. Numbers are floats. A warning counts the
+        trials that failed in this call.
     """
+    table = "trials_wide.csv" if wide else "trials.csv"
+    path = _file(path)
     if os.path.isdir(path):
         if out is not None:
             raise InputError(f"{path}: this is the folder of a study, which is only read; omit 'out'")
         _semblance.check_study_folder(os.fspath(path))
-        return _table(pathlib.Path(path) / "trials.csv")
+        return _table(pathlib.Path(path) / table)
     out = pathlib.Path("out", pathlib.Path(path).stem) if out is None else pathlib.Path(out)
     counts = run_study(path, out, jobs, (0, 1), only, schemes, metrics)
     if counts["failed"]:
         warnings.warn(f"{counts['failed']} of {counts['trials']} trials failed; the table's column 'reason' states why", stacklevel=2)
-    return _table(out / "trials.csv")
+    return _table(out / table)
 
 
 def run_study(path, out, jobs, shard, only, schemes, metrics):
     """Run a shard (index, count) of a study with its plugins; return the counts of its trials and the ranking."""
-    schemes, metrics = list(schemes), list(metrics)
+    schemes, metrics = _own(schemes, Scheme), _own(metrics, Metric)
     for file in _semblance.list_plugins(os.fspath(path)):
         more_schemes, more_metrics = load_plugins(file)
         schemes += more_schemes
@@ -110,10 +120,35 @@ def run_study(path, out, jobs, shard, only, schemes, metrics):
     return _semblance.study(os.fspath(path), os.fspath(out), jobs, shard, only, schemes, metrics)
 
 
+def _file(path):
+    if isinstance(path, dict):
+        raise TypeError("a dict is no configuration; give the path of a YAML file, and options by `set`")
+    return os.fspath(path)
+
+
+def _own(parts, kind):
+    """The list of schemes or metrics; TypeError for a function that was not decorated."""
+    parts = list(parts)
+    for part in parts:
+        if not isinstance(part, kind):
+            word = kind.__name__.lower()
+            raise TypeError(f"{part!r} is no {word}; decorate the function with @semblance.{word}(name)")
+    return parts
+
+
 def _table(file):
     try:
         import pandas
     except ImportError:
         with open(file, encoding="utf-8", newline="") as rows:
-            return list(csv.DictReader(rows))
+            return [{name: _float_or_text(name, text) for name, text in row.items()} for row in csv.DictReader(rows)]
     return pandas.read_csv(file)
+
+
+def _float_or_text(name, text):
+    if name in ("trial", "subject", "status", "reason"):  # a subject may be called 17
+        return text
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return text

@@ -58,7 +58,8 @@ class SurfaceRegressor(*(_plain_base() if BaseEstimator is None else (RegressorM
     Notes
     -----
     The surface is over the two features. More than two features are replaced by their first two principal components,
-    and a single one by itself. Outside the points the heights are those of the nearest place of the domain.
+    and a single one by itself. Outside the rectangle of the points the heights are those of the nearest place in it;
+    standard deviations and intervals are infinite there. Where points are few inside it, ask `fit_.predict(X)["supported"]`.
     """
 
     def __init__(self, options=None, level=0.9, threads=1):
@@ -85,7 +86,10 @@ class SurfaceRegressor(*(_plain_base() if BaseEstimator is None else (RegressorM
         return self
 
     def predict(self, X, return_std=False):
-        """Return the heights at n x 2 places, or with `return_std` a tuple of heights and standard deviations."""
+        """Return the heights at n x 2 places, or with `return_std` a tuple of heights and their standard deviations.
+
+        These are deviations of the surface; for a new observation use `predict_interval`.
+        """
         found = self._predict(X)
         return (found["z"], found["sd"]) if return_std else found["z"]
 
@@ -105,7 +109,13 @@ class SurfaceRegressor(*(_plain_base() if BaseEstimator is None else (RegressorM
         X = self._check_places(X)
         if X.shape[1] != self.n_features_in_:
             raise ValueError(f"X has {X.shape[1]} features, but SurfaceRegressor is expecting {self.n_features_in_} features as input")
-        return self.fit_.predict(np.clip(self._places(X), self.low_, self.high_), self.level, self.threads)
+        places = self._places(X)
+        inside = np.clip(places, self.low_, self.high_)
+        found = self.fit_.predict(inside, self.level, self.threads)
+        outside = np.any(np.abs(places - inside) > 1e-9 * (self.high_ - self.low_), axis=1)
+        for name, unknown in (("sd", np.inf), ("low", -np.inf), ("high", np.inf)):
+            found[name] = np.where(outside, unknown, found[name])
+        return found
 
     def _places(self, X):
         places = (X - self.mean_) @ self.axes_.T + (self.mean_ if X.shape[1] <= 2 else 0)

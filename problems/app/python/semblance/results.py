@@ -20,6 +20,8 @@ class Result:
         Contents of result.json.
     faults : list of str
         Reasons why the result cannot be used; empty if it can.
+    notes : list of str
+        What the program changed, left out or found odd; read them.
     surface : HSpline or None
         The recovered face. None for a study of depth.
     face, first_face, skull, truth : (vertices, triangles) or None
@@ -34,6 +36,7 @@ class Result:
     def __init__(self, numbers, arrays, faults=(), page=None):
         self.numbers = numbers
         self.faults = list(faults)
+        self.notes = list(numbers.get("notes", ()))
         surface = arrays["surface"]
         self.surface = None if surface is None else HSpline._of(surface)
         for name in ("face", "first_face", "skull", "truth", "depth_mm", "sd_mm", "sigma_mm", "region", "parts"):
@@ -41,13 +44,14 @@ class Result:
         self._page = page  # makes the page with the 3-D view; not pickled
 
     def __getitem__(self, name):
+        """`result` for `numbers`, `surface` and `faults`, as the file formats name them."""
         names = {"result": "numbers", "surface": "surface", "faults": "faults"}
         if name not in names:
             raise KeyError(f"{name}; there are result, surface and faults, and the attributes of Result")
         return getattr(self, names[name])
 
     def number(self, path: str):
-        """Return a number of result.json by its dotted path, e.g. "face.rms_mm"; None if it is missing."""
+        """Return a number of result.json by its dotted path, e.g. "face.rms_mm"; None if it is missing or misspelt."""
         value = self.numbers
         for part in path.split("."):
             value = value.get(part) if isinstance(value, dict) else None

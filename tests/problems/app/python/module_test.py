@@ -334,7 +334,37 @@ class Experiments(unittest.TestCase):
         self.assertEqual(len(again), len(table))
         rows = table if isinstance(table, list) else table.to_dict("records")
         self.assertEqual({row["interp"] for row in rows}, {"nearest", "mean"})
-        self.assertTrue(all(row["status"] == "done" for row in rows))
+        self.assertTrue(all(row["status"] == "done" and isinstance(row["value"], float) for row in rows))
+
+    def test_a_wide_table_has_one_row_per_trial(self):
+        with tempfile.TemporaryDirectory() as folder:
+            study = os.path.join(folder, "study.yaml")
+            with open(study, "w") as file:
+                file.write("base: %s\njob: depth\ngrid: {interp: [nearest, mean]}\nset: {subject.rings: 24}\n"
+                           "metric: depth_truth.along_direction.rms_mm\n" % os.path.join(SOURCE, "configs", "phantom.yaml"))
+            wide = semblance.study(study, os.path.join(folder, "out"), wide=True)
+            long = semblance.study(os.path.join(folder, "out"))
+        wide, long = (table if isinstance(table, list) else table.to_dict("records") for table in (wide, long))
+        self.assertEqual(len(wide), 2)
+        for row in wide:
+            same = [other["value"] for other in long if other["interp"] == row["interp"] and other["metric"] == "depth_truth.along_direction.rms_mm"]
+            self.assertEqual(same, [row["depth_truth.along_direction.rms_mm"]])
+
+    def test_wrong_arguments_name_the_remedy(self):
+        def plain(given):
+            return given.depths_mm
+
+        with self.assertRaisesRegex(TypeError, "decorate the function with @semblance.scheme"):
+            semblance.study("study.yaml", schemes=[plain])
+        with self.assertRaisesRegex(TypeError, "decorate the function with @semblance.metric"):
+            semblance.study("study.yaml", metrics=[plain])
+        for call in (semblance.run, semblance.study):
+            with self.assertRaisesRegex(TypeError, "path of a YAML file"):
+                call({"base": "phantom.yaml"})
+        with tempfile.TemporaryDirectory() as folder:
+            open(os.path.join(folder, "a file"), "w").close()
+            with self.assertRaisesRegex(semblance.IoError, "pass force=True"):
+                semblance.run(os.path.join(SOURCE, "configs", "phantom.yaml"), out=folder)
 
     def test_ctrl_c_ends_a_study_between_its_trials(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -39,6 +39,16 @@ class Regressor(unittest.TestCase):
         two = semblance.SurfaceRegressor().fit(places[:300], noisy[:300], sample_weight=np.ones(300)).predict(places)
         np.testing.assert_allclose(one, two, atol=1e-9)
 
+    def test_nothing_is_known_outside_the_points(self):
+        places, _, noisy = table(400, 4)
+        regressor = semblance.SurfaceRegressor().fit(places, noisy)
+        outside = np.array([[60.0, 0.0], [0.0, -1e6]])
+        height, sd = regressor.predict(outside, return_std=True)
+        low, high = regressor.predict_interval(outside)
+        self.assertTrue(np.isfinite(height).all() and np.isinf(sd).all())
+        self.assertTrue(np.isneginf(low).all() and np.isposinf(high).all())
+        self.assertTrue(np.isfinite(regressor.predict(places, return_std=True)[1]).all())
+
     def test_parameters_are_those_of_the_constructor(self):
         regressor = semblance.SurfaceRegressor(level=0.5)
         self.assertEqual(regressor.get_params(), {"options": None, "level": 0.5, "threads": 1})
