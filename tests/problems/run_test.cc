@@ -46,7 +46,8 @@ const fs::path kConfigs = fs::path(SEMBLANCE_SOURCE_DIR) / "configs";
 
 // A phantom that is coarse enough to be quick.
 Experiment SmallPhantom(std::vector<std::string> overrides = {}) {
-  overrides.insert(overrides.begin(), {"subject.rings=40", "implicit.resolution=48"});
+  overrides.insert(overrides.begin(),
+                   {"subject.rings=30", "implicit.resolution=28", "template.max_level=2"});
   return ReadConfig<Experiment>(kConfigs / "phantom.yaml", overrides);
 }
 
@@ -73,7 +74,9 @@ std::map<std::string, std::string> FilesOfRun(const Experiment& experiment, cons
 
 TEST(Run, ThePhantomsImplicitFaceIsWithinAMillimetreOfTheTruth) {
   const Experiment experiment = ReadConfig<Experiment>(
-      kConfigs / "phantom.yaml", std::vector<std::string>{"implicit.resolution=90"});
+      kConfigs / "phantom.yaml",
+      std::vector<std::string>{"implicit.resolution=70", "template.max_level=2",
+                               "uncertainty.sigma=false"});
   const RunResult result = problems::Run(experiment, {});
   ASSERT_TRUE(result.truth);
   EXPECT_LE(result.truth->implicit.truth_to_face.rms_mm, 1.0);
@@ -264,8 +267,8 @@ TEST(Run, TheFaceIsASheetWithoutFoldsThatFacesOut) {
 RunResult RunWithTerm(const std::string& term, StageCache& cache) {
   return problems::Run(
       SmallPhantom({fmt::format("fit.terms=[points, smoothness, membrane{}]", term),
-                    "fit.plan.schedule=[{level: 0, fraction: 1}]", "fit.relaxation=none",
-                    "uncertainty.sigma=false"}),
+                    "template.max_level=1", "fit.plan.schedule=[{level: 0, fraction: 1}]",
+                    "fit.relaxation=none", "uncertainty.sigma=false"}),
       {}, &cache);
 }
 
@@ -377,7 +380,7 @@ TEST(Run, ATemplateThatIsNotThereIsOneClearError) {
 
 // A phantom in files. Only its left cheek is missing.
 Experiment WithoutCheek(const fs::path& folder) {
-  const Phantom phantom = MakePhantom({.random_seed = 2, .rings = 40});
+  const Phantom phantom = MakePhantom({.random_seed = 2, .rings = 30});
   const Vec3 cheek =
       std::ranges::find(phantom.sites, std::string("im_l"), &PhantomSite::site)->base;
   std::vector<bool> keep;

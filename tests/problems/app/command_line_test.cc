@@ -36,7 +36,8 @@ using testing::ScratchFolder;
 const std::string kProgram = SEMBLANCE_PROGRAM;
 const std::string kConfigs = SEMBLANCE_SOURCE_DIR "/configs";
 const std::string kQuick =
-    " --quiet --set subject.rings=24 --set implicit.resolution=24 --set face=placed";
+    " --quiet --set subject.rings=16 --set implicit.resolution=16 --set template.max_level=1 "
+    "--set 'fit.plan.schedule=[{level: 0, fraction: 1}]' --set face=placed";
 
 class CommandLine : public ::testing::Test {
  protected:
@@ -86,7 +87,7 @@ TEST_F(CommandLine, AMissingMetricIsReportedAndNothingIsRanked) {
 // Ceres reports the line search of a flat cost through glog, which would print it on the terminal.
 TEST_F(CommandLine, LibrariesAreSilent) {
   const Outcome outcome = Call("depth " + kConfigs +
-                               "/phantom.yaml --out d --quiet --set subject.rings=30 --set "
+                               "/phantom.yaml --out d --quiet --set subject.rings=24 --set "
                                "'interp={type: kriging, length_mm: 3000}'");
   EXPECT_EQ(outcome.code, 0);
   EXPECT_EQ(outcome.err, "");
@@ -121,7 +122,7 @@ TEST_F(CommandLine, RunWritesAReportAndPrintsItsPath) {
 
 TEST_F(CommandLine, DepthPrintsErrorsAgainstTheTruthAndLeftOutDowels) {
   const Outcome outcome = Call("depth " + kConfigs +
-                               "/phantom.yaml --out depth --quiet --set subject.rings=30 "
+                               "/phantom.yaml --out depth --quiet --set subject.rings=24 "
                                "--set interp=network_spline");
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
@@ -129,13 +130,13 @@ TEST_F(CommandLine, DepthPrintsErrorsAgainstTheTruthAndLeftOutDowels) {
                                  HasSubstr("  k_fold"), HasSubstr("landmark left out")));
   EXPECT_TRUE(fs::exists(folder_ / "depth" / "depth.ply"));
   const Outcome given = Call("depth " + kConfigs +
-                             "/phantom.yaml --out given --quiet --set subject.rings=30 "
+                             "/phantom.yaml --out given --quiet --set subject.rings=24 "
                              "--set 'tissue={depths: table, table: " +
                              kConfigs + "/tables/t_table_2023.yaml, given: {measured: [g]}}'");
   EXPECT_EQ(given.code, 0) << given.err;
   EXPECT_THAT(given.out, HasSubstr("note: tissue depths are those expected given g"));
   ExpectRefused("depth " + kConfigs +
-                    "/phantom.yaml --out map --quiet --set subject.rings=30 "
+                    "/phantom.yaml --out map --quiet --set subject.rings=24 "
                     "--set interp=depth_map",
                 "no file is named");
 }
@@ -453,7 +454,8 @@ TEST_F(CommandLine, AKilledRunLeavesNoFileAndTheNextOneCleansUp) {
   const pid_t child = ::fork();
   if (child == 0) {
     ::execl(kProgram.c_str(), "semblance", "run", config.c_str(), "--out", out.c_str(), "--quiet",
-            "--set", "subject.rings=30", "--set", "implicit.resolution=40", nullptr);
+            "--set", "subject.rings=24", "--set", "implicit.resolution=20", "--set",
+            "template.max_level=2", nullptr);
     ::_exit(127);
   }
   while (!fs::exists(part / "face.ply") && ::waitpid(child, nullptr, WNOHANG) == 0) {
@@ -463,7 +465,7 @@ TEST_F(CommandLine, AKilledRunLeavesNoFileAndTheNextOneCleansUp) {
   ::waitpid(child, nullptr, 0);
   EXPECT_NO_THROW(ReadMesh(part / "face.ply"));
   EXPECT_FALSE(fs::exists(out));
-  EXPECT_EQ(Call("depth " + config + " --out out --quiet --set subject.rings=30").code, 0);
+  EXPECT_EQ(Call("depth " + config + " --out out --quiet --set subject.rings=24").code, 0);
   EXPECT_TRUE(fs::exists(fs::path(out) / "result.json"));
   EXPECT_FALSE(fs::exists(fs::path(out) / "face.ply"));
   EXPECT_FALSE(fs::exists(part));

@@ -26,7 +26,8 @@ using ::testing::Not;
 using testing::WordsOf;
 
 Experiment Phantom30(const std::string& sites, std::vector<std::string> overrides = {}) {
-  overrides.insert(overrides.begin(), {"subject.rings=30", "implicit.resolution=40"});
+  overrides.insert(overrides.begin(),
+                   {"subject.rings=30", "implicit.resolution=24", "template.max_level=2"});
   if (!sites.empty()) {
     overrides.push_back("sites={" + sites + "}");
   }

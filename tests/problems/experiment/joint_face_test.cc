@@ -30,8 +30,8 @@ const std::string kFaces = SEMBLANCE_SOURCE_DIR "/configs/faces/ict/";
 Experiment SmallPhantom(const std::string& face, std::vector<std::string> more = {}) {
   const std::string small = "estimate: {field: {centres: 30}}";
   std::vector<std::string> overrides = {
-      "subject.rings=30",
-      "implicit.resolution=36",
+      "subject.rings=24",
+      "implicit.resolution=24",
       "uncertainty.sigma=false",
       fmt::format("template={{type: file, surface: {0}head.hspline.json, sites: {0}sites.csv, "
                   "features: {0}features.json}}",

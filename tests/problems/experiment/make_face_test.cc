@@ -20,7 +20,8 @@ using ::testing::HasSubstr;
 
 // The generic face is only placed, which is quick.
 Experiment PlacedPhantom(std::vector<std::string> overrides) {
-  overrides.insert(overrides.end(), {"subject.rings=20", "implicit.resolution=24", "face=placed"});
+  overrides.insert(overrides.end(), {"subject.rings=20", "implicit.resolution=16",
+                                     "template.max_level=2", "face=placed"});
   return ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides);
 }
 
@@ -52,7 +53,10 @@ struct Worth {
 Worth WorthOf(const std::string& site_error, const std::string& relaxation, StageCache& cache) {
   const auto experiment = ReadConfig<Experiment>(
       std::filesystem::path(SEMBLANCE_SOURCE_DIR) / "configs/phantom.yaml",
-      std::vector<std::string>{"subject.rings=40", "implicit.resolution=48", "rounds=2",
+      std::vector<std::string>{"subject.rings=40", "implicit.resolution=36", "rounds=2",
+                               "template.max_level=2",
+                               "fit.plan.schedule=[{level: 0, fraction: 1}, {level: 1, fraction: "
+                               "1}, {level: 2, fraction: 1}]",
                                "uncertainty.sigma=false", "template.site_error=" + site_error,
                                "fit.relaxation=" + relaxation});
   const RunResult run = Run(experiment, {}, &cache);

@@ -60,8 +60,9 @@ struct Example {
 const RunResult& GoodRun() {
   static const RunResult run = Run(
       ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml",
-                             std::vector<std::string>{"subject.rings=30", "implicit.resolution=32",
-                                                      "seeds.level=0", "uncertainty.sigma=false"}),
+                             std::vector<std::string>{"subject.rings=30", "implicit.resolution=24",
+                                                      "template.max_level=2", "seeds.level=0",
+                                                      "uncertainty.sigma=false"}),
       {});
   return run;
 }
@@ -183,7 +184,7 @@ const std::vector<Mistake>& Mistakes() {
        [](Example& c) {
          const int level = c.surface.shape().max_level;
          ControlNet net = c.surface.Net(level);
-         net.At(net.columns / 2, net.rows / 2).y() -= 60;
+         net.At(net.columns / 2, net.rows / 2).y() -= 120;  // as steep as 60 mm at level 3
          c.surface.SetNet(level, net);
        }},
       {"ThroughItself", "crossing_share",

@@ -24,7 +24,7 @@ RunResult RunSpringPhantom(const std::string& face, int threads = 1) {
   static StageCache cache(8);
   RunContext context;
   context.threads = threads;
-  const std::vector<std::string> overrides = {"subject.rings=30", "implicit.resolution=36",
+  const std::vector<std::string> overrides = {"subject.rings=24", "implicit.resolution=28",
                                               "face=" + face};
   return problems::Run(
       ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides), context,

@@ -24,7 +24,8 @@ const std::string kPhantom = SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml";
 const RunResult& RunPhantom(std::vector<std::string> overrides) {
   static StageCache cache(8);
   static std::map<std::vector<std::string>, RunResult> runs;
-  overrides.insert(overrides.begin(), {"subject.rings=30", "implicit.resolution=36"});
+  overrides.insert(overrides.begin(),
+                   {"subject.rings=24", "implicit.resolution=24", "template.max_level=2"});
   if (const auto found = runs.find(overrides); found != runs.end()) {
     return found->second;
   }

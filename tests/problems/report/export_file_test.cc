@@ -39,7 +39,7 @@ class ExportFile : public ::testing::Test {
   // The folder of a coarse phantom.
   fs::path WriteSmallRun() {
     const std::vector<std::string> overrides = {
-        "subject.rings=40",     "implicit.resolution=20",
+        "subject.rings=20",     "implicit.resolution=16",
         "seeds.level=0",        "first_fit=[]",
         "template.max_level=1", "fit.plan.schedule=[{level: 0, fraction: 1}]"};
     const auto experiment =

@@ -91,8 +91,8 @@ addEventListener('load', () => setTimeout(() => {
 
 RunResult SmallRun(int random_seed, const std::string& override = "rounds=1") {
   const std::vector<std::string> overrides = {fmt::format("subject.random_seed={}", random_seed),
-                                              "subject.rings=40",
-                                              "implicit.resolution=30",
+                                              "subject.rings=16",
+                                              "implicit.resolution=16",
                                               "seeds.level=0",
                                               "template.max_level=1",
                                               "fit.plan.schedule=[{level: 0, fraction: 1}]",

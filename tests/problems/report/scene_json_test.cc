@@ -93,8 +93,12 @@ TEST(SceneBlobs, EqualGeometryIsStoredOnce) {
 }
 
 TEST(SceneJson, TheFaceLiesOnTheSurface) {
-  const std::vector<std::string> overrides = {"subject.rings=40", "implicit.resolution=30",
-                                              "rounds=1", "template.max_level=1",
+  const std::vector<std::string> overrides = {"subject.rings=20",
+                                              "implicit.resolution=16",
+                                              "uncertainty.sigma=false",
+                                              "seeds.level=0",
+                                              "rounds=1",
+                                              "template.max_level=1",
                                               "fit.plan.schedule=[{level: 0, fraction: 1}]"};
   const RunResult run = problems::Run(
       ReadConfig<Experiment>(SEMBLANCE_SOURCE_DIR "/configs/phantom.yaml", overrides), {});
@@ -103,7 +107,7 @@ TEST(SceneJson, TheFaceLiesOnTheSurface) {
       std::ranges::find_if(scene["layers"], [](const Json& of) { return of["id"] == "face"; });
   ASSERT_NE(layer, scene["layers"].end());
   const TriMesh shown = DecodeMeshBlob(scene["blobs"][(*layer)["mesh"].get<std::string>()]);
-  const TriMesh fine = Tessellate(run.fit.surface, 64).mesh;
+  const TriMesh fine = Tessellate(run.fit.surface, 40).mesh;
   const MeshQuery of_shown(shown), of_fine(fine);
   for (const Vec3& p : shown.points) {
     EXPECT_LT(of_fine.Closest(p).distance_mm, 0.02);

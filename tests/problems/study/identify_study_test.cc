@@ -24,7 +24,7 @@ using testing::ScratchFolder;
 const std::string kStudy = fmt::format(
     "base: {}/configs/phantom.yaml\n"
     "job: identify\n"
-    "set: {{subject.rings: 24, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
+    "set: {{subject.rings: 16, implicit.resolution: 16, seeds.level: 0, template.max_level: 1,\n"
     "      fit.plan.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n"
     "subjects:\n  - {{name: a, set: {{subject.random_seed: 1}}}}\n"
     "  - {{name: b, set: {{subject.random_seed: 2}}}}\n"

@@ -32,7 +32,7 @@ using testing::WordsOf;
 
 const std::string kBase = fmt::format(
     "base: {}/configs/phantom.yaml\n"
-    "set: {{subject.rings: 24, implicit.resolution: 20, seeds.level: 0, template.max_level: 1,\n"
+    "set: {{subject.rings: 16, implicit.resolution: 16, seeds.level: 0, template.max_level: 1,\n"
     "      fit.plan.schedule: [{{level: 0, fraction: 1}}], first_fit: []}}\n",
     SEMBLANCE_SOURCE_DIR);
 

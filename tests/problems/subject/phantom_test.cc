@@ -246,7 +246,7 @@ class PhantomLikePeople : public ::testing::TestWithParam<int> {
  protected:
   const Phantom phantom_ = MakePhantom(LikePeople(static_cast<std::uint64_t>(GetParam()), 60));
 };
-INSTANTIATE_TEST_SUITE_P(Seeds, PhantomLikePeople, ::testing::Range(1, 6));
+INSTANTIATE_TEST_SUITE_P(Seeds, PhantomLikePeople, ::testing::Range(1, 3));
 
 TEST_P(PhantomLikePeople, HasTheSmoothOnesFace) {
   const Phantom smooth =

@@ -37,8 +37,9 @@ class WorkbenchBench : public ::testing::Test {
   BenchOptions Options() {
     const fs::path config = folder_ / "phantom.yaml";
     WriteFileAtomically(config, fmt::format("base: {}/configs/phantom.yaml\n"
-                                            "subject: {{rings: 30}}\n"
-                                            "implicit: {{resolution: 24}}\nface: thin_plate\n",
+                                            "subject: {{rings: 20}}\n"
+                                            "implicit: {{resolution: 18}}\nface: thin_plate\n"
+                                            "template: {{type: formula, max_level: 2}}\n",
                                             SEMBLANCE_SOURCE_DIR));
     BenchOptions options;
     options.source = config;

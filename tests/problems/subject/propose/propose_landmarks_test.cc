@@ -25,10 +25,38 @@ Phantom PhantomOf(std::uint64_t random_seed) {
   return MakePhantom({.random_seed = random_seed, .rings = kRings});
 }
 
-std::vector<ReferenceHead> OneReference() {
-  std::vector<ReferenceHead> heads;
-  heads.push_back(PhantomReference(11));
+const std::vector<ReferenceHead>& OneReference() {
+  static const std::vector<ReferenceHead> heads = [] {
+    std::vector<ReferenceHead> one;
+    one.push_back(PhantomReference(11));
+    return one;
+  }();
   return heads;
+}
+
+Proposal ProposeAt(const Similarity& pose, int threads) {
+  return ProposeLandmarks(Transformed(PhantomOf(4).skull, pose), "skull.ply", OneReference(),
+                          {.on_event = {}, .stop_token = {}, .threads = threads});
+}
+
+// The phantom where it was made, by one thread.
+const Proposal& PlainProposal() {
+  static const Proposal proposal = ProposeAt({}, 1);
+  return proposal;
+}
+
+// The phantom moved, turned and scaled.
+const Similarity& OtherPose() {
+  static const Similarity pose = [] {
+    Random random(9);
+    const Mat3 turn = Eigen::AngleAxisd(2.1, random.Direction()).toRotationMatrix();
+    return Similarity{.scale = 1.08, .rotation = turn, .translation = random.InBox(-200, 200)};
+  }();
+  return pose;
+}
+const Proposal& MovedProposal() {
+  static const Proposal proposal = ProposeAt(OtherPose(), 2);
+  return proposal;
 }
 
 LandmarkFile Truth(const Phantom& phantom, const Similarity& pose) {
@@ -45,7 +73,7 @@ LandmarkFile Truth(const Phantom& phantom, const Similarity& pose) {
 
 std::string ErrorOf(const TriMesh& skull) {
   try {
-    const std::vector<ReferenceHead> references = OneReference();
+    const std::vector<ReferenceHead>& references = OneReference();
     ProposeLandmarks(skull, "skull.ply", references, {});
   } catch (const InputError& e) {
     return e.what();
@@ -54,19 +82,10 @@ std::string ErrorOf(const TriMesh& skull) {
 }
 
 TEST(ProposeLandmarks, FindsTheSitesOfAMovedAndScaledHead) {
-  const Phantom phantom = PhantomOf(4);
-  const std::vector<ReferenceHead> references = OneReference();
-  Random random(9);
-  const Similarity pose = {
-      .scale = 1.08,
-      .rotation = Eigen::AngleAxisd(2.1, random.Direction()).toRotationMatrix(),
-      .translation = random.InBox(-200, 200)};
-  const Proposal proposal =
-      ProposeLandmarks(Transformed(phantom.skull, pose), "skull.ply", references,
-                       {.on_event = {}, .stop_token = {}, .threads = 2});
+  const Proposal& proposal = MovedProposal();
   EXPECT_THAT(proposal.absent, IsEmpty());
   const ProposalComparison found =
-      CompareProposal(ProposalFile(proposal, "head"), Truth(phantom, pose));
+      CompareProposal(ProposalFile(proposal, "head"), Truth(PhantomOf(4), OtherPose()));
   EXPECT_EQ(found.compared, 32);
   EXPECT_LT(found.median_mm, 3);
   EXPECT_LT(found.nine_tenths_mm, 6);
@@ -75,14 +94,10 @@ TEST(ProposeLandmarks, FindsTheSitesOfAMovedAndScaledHead) {
 
 TEST(ProposeLandmarks, MarkersPointOutwardsInTheFrameOfTheSkull) {
   const Phantom phantom = PhantomOf(4);
-  const std::vector<ReferenceHead> references = OneReference();
-  const Similarity pose = {.scale = 1,
-                           .rotation = Eigen::AngleAxisd(2.1, Vec3::UnitZ()).toRotationMatrix()};
-  const LandmarkFile file = ProposalFile(
-      ProposeLandmarks(Transformed(phantom.skull, pose), "skull.ply", references, {}), "head");
+  const LandmarkFile file = ProposalFile(MovedProposal(), "head");
   Vec3 middle = Vec3::Zero();
   for (const PhantomSite& s : phantom.sites) {
-    middle += pose * s.base / static_cast<double>(phantom.sites.size());
+    middle += OtherPose() * s.base / static_cast<double>(phantom.sites.size());
   }
   ASSERT_FALSE(file.landmarks.empty());
   for (const Landmark& l : file.landmarks) {
@@ -94,12 +109,7 @@ TEST(ProposeLandmarks, MarkersPointOutwardsInTheFrameOfTheSkull) {
 }
 
 TEST(ProposeLandmarks, DoesNotDependOnThreads) {
-  const TriMesh skull = PhantomOf(4).skull;
-  const std::vector<ReferenceHead> references = OneReference();
-  const Proposal one = ProposeLandmarks(skull, "skull.ply", references,
-                                        {.on_event = {}, .stop_token = {}, .threads = 1});
-  const Proposal two = ProposeLandmarks(skull, "skull.ply", references,
-                                        {.on_event = {}, .stop_token = {}, .threads = 2});
+  const Proposal &one = PlainProposal(), two = ProposeAt({}, 2);
   ASSERT_EQ(one.sites.size(), two.sites.size());
   for (std::size_t k = 0; k < one.sites.size(); ++k) {
     EXPECT_EQ(one.sites[k].point, two.sites[k].point);
@@ -112,7 +122,7 @@ TEST(ProposeLandmarks, RecognisesRasAndWritesItToTheFile) {
   const Similarity ras = {.scale = 1,
                           .rotation = Vec3(-1, -1, 1).asDiagonal().toDenseMatrix(),
                           .translation = Vec3::Zero()};
-  const std::vector<ReferenceHead> references = OneReference();
+  const std::vector<ReferenceHead>& references = OneReference();
   const Proposal proposal =
       ProposeLandmarks(Transformed(phantom.skull, ras), "skull.ply", references, {});
   EXPECT_EQ(ProposalFile(proposal, "head").axes, "RAS");
@@ -131,7 +141,7 @@ TEST(ProposeLandmarks, SidesAreNeverExchanged) {
   for (Triangle& t : mirrored.triangles) {
     std::swap(t[1], t[2]);
   }
-  const std::vector<ReferenceHead> references = OneReference();
+  const std::vector<ReferenceHead>& references = OneReference();
   for (const ProposedSite& s : ProposeLandmarks(mirrored, "skull.ply", references, {}).sites) {
     const double side = SideOfSite(s.site) == Side::kLeft    ? 1
                         : SideOfSite(s.site) == Side::kRight ? -1
@@ -146,7 +156,7 @@ TEST(ProposeLandmarks, MissingBoneGivesAbsentSites) {
   for (const Triangle& t : phantom.skull.triangles) {
     keep.push_back(TriangleCentroid(phantom.skull, t).z() > -72);
   }
-  const std::vector<ReferenceHead> references = OneReference();
+  const std::vector<ReferenceHead>& references = OneReference();
   const Proposal proposal =
       ProposeLandmarks(Submesh(phantom.skull, keep), "skull.ply", references, {});
   for (const char* site : {"pg", "me"}) {
@@ -169,12 +179,10 @@ TEST(ProposeLandmarks, AMeshThatIsNoSkullGivesOneClearLine) {
 }
 
 TEST(ProposeLandmarks, MoreConfidentSitesHaveSmallerErrors) {
-  const std::vector<ReferenceHead> references = OneReference();
-  for (const ProposedSite& s :
-       ProposeLandmarks(PhantomOf(4).skull, "skull.ply", references, {}).sites) {
+  for (const ProposedSite& s : PlainProposal().sites) {
     EXPECT_GT(s.confidence, 0) << s.site;
     EXPECT_LT(s.confidence, 1) << s.site;
-    EXPECT_GE(s.expected_error_mm, references[0].site_error_mm) << s.site;
+    EXPECT_GE(s.expected_error_mm, OneReference()[0].site_error_mm) << s.site;
   }
 }
 
