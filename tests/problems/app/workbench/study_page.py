@@ -46,7 +46,7 @@ def work(browser, program, study, folder):
         assert run.wait() == 0
     finally:
         run.kill()
-    assert browser.run(FINISHED) == 54
+    assert browser.run(FINISHED) == 27
     assert "Factors" in browser.run(HEADINGS), browser.run(HEADINGS)
     assert "Trials" in browser.run(IS_OPEN)
     complaints = browser.complaints()
@@ -64,7 +64,7 @@ def main():
         return SKIPPED
     shutil.rmtree(folder, ignore_errors=True)
     os.makedirs(folder)
-    subjects = ", ".join(f"{{name: phantom {n}, set: {{subject.random_seed: {n}}}}}" for n in range(1, 7))
+    subjects = ", ".join(f"{{name: phantom {n}, set: {{subject.random_seed: {n}}}}}" for n in range(1, 4))
     study = os.path.join(folder, "live.yaml")
     with open(study, "w", encoding="utf-8") as file:
         file.write(STUDY.format(config=config, subjects=subjects))
