@@ -426,10 +426,23 @@ Json RecordJson(const CaseRecord& record) {
   return {{"number", record.number}, {"age", record.age}, {"notes", record.notes}};
 }
 
+namespace {
+
+// What `auto` and `default` stand for in this run.
+Json MethodJson(const Experiment& experiment) {
+  const auto name = [](const auto& choice) {
+    return std::visit([](const auto& chosen) { return chosen.kName; }, choice);
+  };
+  return {{"face", name(WayToFace(experiment))}, {"interp", name(WayToDepth(experiment))}};
+}
+
+}  // namespace
+
 Json ResultJson(const Experiment& experiment, const RunResult& result) {
   Json json = {{"title", experiment.title},
                {"subject", result.subject.name},
                {"record", RecordJson(experiment.record)},
+               {"method", MethodJson(experiment)},
                {"usable", result.usable()},
                {"faults", result.Faults()},
                {"plausibility", PlausibilityToJson(result.plausibility)}};

@@ -581,10 +581,21 @@ std::string FitSentence(const Json& fit) {
       fmt::join(named, ", "), fmt::join(solvers, " and "), PointsSentence(fit), HoldSentence(fit));
 }
 
-ReportSection FitSection(const Json& fit, const OutputFolder& folder) {
+// Empty for a result of an older version, which does not state it.
+std::string MethodSentence(const Json& result) {
+  if (!result.contains("method")) {
+    return "";
+  }
+  const Json& method = result.at("method");
+  return fmt::format("Method of the face: {}. Interpolation of depth: {}. ",
+                     method.at("face").get<std::string>(), method.at("interp").get<std::string>());
+}
+
+ReportSection FitSection(const Json& result, const OutputFolder& folder) {
+  const Json& fit = result.at("fit");
   ReportSection section{
       .heading = "How the face was fitted",
-      .paragraphs = {FitSentence(fit)},
+      .paragraphs = {MethodSentence(result) + FitSentence(fit)},
       .tables = WithoutEmptyTables({LevelsTable(fit), CostsTable(fit), RelaxationTable(fit),
                                     FeaturesTable(fit), CountsTable("Counts of the fit", fit)}),
       .folded = true};
@@ -637,7 +648,7 @@ std::vector<ReportSection> Sections(const Json& result, const OutputFolder& fold
                       .paragraphs = TurnedDowels(folder.Root() / "dowels.csv"),
                       .tables = {DowelsTable(folder.Root() / "dowels.csv")},
                       .folded = true});
-  sections.push_back(FitSection(result.at("fit"), folder));
+  sections.push_back(FitSection(result, folder));
   if (HasSigma(result)) {
     sections.push_back(UncertaintySection(result, folder));
   }

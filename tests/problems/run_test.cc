@@ -174,7 +174,9 @@ TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
   for (const double off : result.prior->tip_residual_mm) {
     EXPECT_LT(std::abs(off), 6);
   }
-  EXPECT_THAT(ResultJson(experiment, result).dump(), HasSubstr("coefficients_rms"));
+  const auto json = ResultJson(experiment, result);
+  EXPECT_THAT(json.dump(), HasSubstr("coefficients_rms"));
+  EXPECT_EQ(json.at("method").at("face"), "prior");
 }
 
 // At a site that the prior lacks, the (u,v) is that of the point of the face nearest to the tip.
@@ -363,6 +365,8 @@ TEST(Run, ATemplateFromAFileGivesTheSameFaceToTheBit) {
   const RunResult first = problems::Run(formula, {}, &cache),
                   second = problems::Run(from_file, {}, &cache);
   EXPECT_EQ(ResultJson(formula, first).dump(), ResultJson(from_file, second).dump());
+  EXPECT_EQ(ResultJson(formula, first).at("method").dump(),
+            R"({"face":"fit","interp":"barycentric"})");  // the first is `auto` in the file
   EXPECT_EQ(HSplineToJson(first.fit.surface), HSplineToJson(second.fit.surface));
   EXPECT_EQ(first.face.mesh.points, second.face.mesh.points);
   EXPECT_EQ(first.uncertainty->median_mm, second.uncertainty->median_mm);
