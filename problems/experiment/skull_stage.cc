@@ -189,16 +189,16 @@ TriMesh Rotated(TriMesh mesh, const Mat3& rotation) {
 
 // A depth is linear across a triangle, so without filling the face would depend on the size of a
 // coarse mesh's triangles: those of 5 mm move it by 0.02 mm (RMS). Finer ones cost time.
-// A phantom's triangles are an option, its rings.
-TriMesh UnfilledShell(const SubjectData& data, const Subject& subject) {
-  constexpr double kMeanEdge_mm = 3;
-  return std::holds_alternative<PhantomOptions>(subject) ? data.skull
-                                                         : RefineTo(data.skull, kMeanEdge_mm);
+// A phantom's triangles are an option, its rings, and a depth map is one of the skull's vertices.
+bool RefinesUnfilled(const Experiment& e) {
+  return !std::holds_alternative<PhantomOptions>(e.subject) &&
+         !std::holds_alternative<interp::DepthMap>(WayToDepth(e));
 }
 
 TriMesh FillUpright(const SubjectData& data, const Experiment& e, const RunContext& context) {
+  constexpr double kMeanEdge_mm = 3;
   if (std::holds_alternative<NoFill>(e.fill)) {
-    return UnfilledShell(data, e.subject);
+    return RefinesUnfilled(e) ? RefineTo(data.skull, kMeanEdge_mm) : data.skull;
   }
   const Mat3 upright = FindUpright(data);
   return Rotated(FillSkull(Rotated(data.skull, upright), e.fill, context), upright.transpose());
@@ -213,7 +213,8 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
   });
   Case subject = MakeCase(*data, e, context);
   const auto shell = step("fill skull", [&] {
-    return cache.Get<TriMesh>(StageKey("shell", e.subject, e.fill),
+    const char* const stage = RefinesUnfilled(e) ? "shell" : "shell as given";
+    return cache.Get<TriMesh>(StageKey(stage, e.subject, e.fill),
                               [&] { return FillUpright(*data, e, context); });
   });
   const auto* const wrap = std::get_if<WrapFill>(&e.fill);
