@@ -428,7 +428,7 @@ Json RecordJson(const CaseRecord& record) {
 
 namespace {
 
-// What `auto` and `default` stand for in this run.
+// The choices for which `auto` and `default` stand in this run.
 Json MethodJson(const Experiment& experiment) {
   const auto name = [](const auto& choice) {
     return std::visit([](const auto& chosen) { return chosen.kName; }, choice);

@@ -336,8 +336,8 @@ class MistakeSearch {
     }
   }
 
-  // Depths that were all halved, doubled or scaled, which JudgeFace's depth_factor lets pass. 69
-  // heads on which depths were measured have median factors of 0.66 to 1.75
+  // Finds depths that are all halved or doubled, which the limit of depth_factor (plausibility.h)
+  // does not exclude. 69 heads on which depths were measured have median factors of 0.66 to 1.75
   // (docs/explanation/plausibility.md).
   void NoteDepthLevel() {
     constexpr double kLeastFactor = 0.6, kMostFactor = 1.9;
