@@ -14,6 +14,7 @@
 #include "problems/experiment/make_face.h"
 #include "problems/face/hspline_prior.h"
 #include "surfaces/hspline_files/hspline_json.h"
+#include "surfaces/mesh/refine_mesh.h"
 
 namespace semblance::problems {
 namespace {
@@ -133,8 +134,9 @@ TruthComparison CompareWithTruth(const Experiment& experiment, const SkullStage&
   const TriMesh& skin = *subject.skin;
   TruthComparison truth;
   truth.skin = std::move(scored);
-  truth.face = CompareFaces(skin, truth.skin.region, face, context);
-  truth.details = MeasureDetails(skin, truth.skin, subject.basis, face, context);
+  const TriMesh fine = RefineTo(face, kEdgeForSums_mm);  // as `semblance evaluate`
+  truth.face = CompareFaces(skin, truth.skin.region, fine, context);
+  truth.details = MeasureDetails(skin, truth.skin, subject.basis, fine, context);
   truth.implicit = CompareFaces(skin, truth.skin.region, skull.implicit.mesh, context);
   truth.depth = CompareDepths(experiment, *skull.depth_stage, skull.depth_stage->depth, context);
   if (uncertainty && experiment.uncertainty.sigma) {

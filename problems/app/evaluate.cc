@@ -21,6 +21,7 @@
 #include "surfaces/hspline_files/hspline_json.h"
 #include "surfaces/mesh/join_copies.h"
 #include "surfaces/mesh/mesh_check.h"
+#include "surfaces/mesh/refine_mesh.h"
 #include "surfaces/mesh_files/mesh_io.h"
 
 namespace semblance::problems {
@@ -138,7 +139,7 @@ nlohmann::ordered_json Evaluate(const EvaluateOptions& options, const RunContext
         "evaluate: the configuration names landmarks and zones; leave --landmarks and --exclude "
         "out, or change it with --set");
   }
-  const TriMesh face = ReadFace(options.face, notes);
+  const TriMesh face = RefineTo(ReadFace(options.face, notes), kEdgeForSums_mm);  // as in a run
   const Truth truth = options.config.empty() ? ReadTruthFiles(options, notes)
                                              : ReadTruthOfExperiment(options, context, notes);
   Accept(FindFaceMistakes(face, truth.skin), notes);

@@ -188,17 +188,16 @@ TriMesh Rotated(TriMesh mesh, const Mat3& rotation) {
 }
 
 // A depth is linear across a triangle, so without filling the face would depend on the size of a
-// coarse mesh's triangles: those of 5 mm move it by 0.02 mm (RMS). Finer ones cost time.
-// A phantom's triangles are an option, its rings, and a depth map is one of the skull's vertices.
+// coarse mesh's triangles. A phantom's triangles are an option, its rings, and a depth map is one
+// of the skull's vertices.
 bool RefinesUnfilled(const Experiment& e) {
   return !std::holds_alternative<PhantomOptions>(e.subject) &&
          !std::holds_alternative<interp::DepthMap>(WayToDepth(e));
 }
 
 TriMesh FillUpright(const SubjectData& data, const Experiment& e, const RunContext& context) {
-  constexpr double kMeanEdge_mm = 3;
   if (std::holds_alternative<NoFill>(e.fill)) {
-    return RefinesUnfilled(e) ? RefineTo(data.skull, kMeanEdge_mm) : data.skull;
+    return RefinesUnfilled(e) ? RefineTo(data.skull, kEdgeForSums_mm) : data.skull;
   }
   const Mat3 upright = FindUpright(data);
   return Rotated(FillSkull(Rotated(data.skull, upright), e.fill, context), upright.transpose());

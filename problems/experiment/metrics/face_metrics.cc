@@ -11,7 +11,6 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
-#include "surfaces/mesh/refine_mesh.h"
 
 namespace semblance::problems {
 namespace {
@@ -224,7 +223,7 @@ std::vector<bool> FaceOverScoredSkin(const TriMesh& outer, const FaceRegion& reg
   const std::vector<bool> comparable = ComparableTriangles(outer, region);
   std::vector<char> over(face.points.size(), 0);
   ParallelFor(face.points.size(), context.threads, 256, [&](std::size_t v) {
-    over[v] = comparable[outer_query.Closest(face.points[v]).triangle];
+    over[v] = comparable[outer_query.Closest(face.points[v]).triangle] ? 1 : 0;
   });
   return {over.begin(), over.end()};
 }
@@ -320,16 +319,13 @@ FaceMetrics CompareFaces(const TriMesh& truth, const FaceRegion& region, const T
   for (const auto& [part, enclosed] : volume.parts) {
     metrics.region_volumes[kFaceParts[part]] = enclosed;
   }
-  // On triangles of 5 mm the sum over the face's vertices is off by 0.02 mm; finer ones cost time.
-  constexpr double kMeanEdge_mm = 3;
-  const TriMesh fine = RefineTo(face, kMeanEdge_mm);
-  const std::vector<bool> over = FaceOverScoredSkin(outer, region, outer_query, fine, context);
+  const std::vector<bool> over = FaceOverScoredSkin(outer, region, outer_query, face, context);
   // These distances are seen from the face. The truth lies outside the face if the face lies inside
   // the truth, so the sign turns.
   std::vector<double> back =
-      FindNearest(fine, VertexNormals(fine), over, outer_query, context).signed_mm;
+      FindNearest(face, VertexNormals(face), over, outer_query, context).signed_mm;
   std::transform(back.begin(), back.end(), back.begin(), [](double d) { return -d; });
-  const std::vector<Sample> here = TakeSamples(back, VertexAreas(fine), any);
+  const std::vector<Sample> here = TakeSamples(back, VertexAreas(face), any);
   metrics.face_to_truth = Summarize(here);
   metrics.symmetric = Summarize(EvenlyWeighted(there, here));
   metrics.hausdorff_mm = std::fmax(metrics.truth_to_face.max_mm, metrics.face_to_truth.max_mm);
