@@ -335,6 +335,7 @@ void MeasureSites(const DrawnSkull& drawn, PersonPhantom& person) {
   const SkullShell shell = AsShell(person.skull);
   const SurfaceEnds ends(person.skull);
   const SuggestedBone bone{person.skull, shell.surface.query(), ends};
+  person.nasion = drawn.SiteOn(person.skull.points, drawn.sites.at("n"));
   for (const Site& site : StandardSites()) {
     const auto at = drawn.sites.find(site.code);
     if (at == drawn.sites.end()) {

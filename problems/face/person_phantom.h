@@ -27,8 +27,9 @@ struct PersonPhantom {
   // A face is scored against this: the skin, without the walls of those openings, and their
   // closing.
   TriMesh true_skin;
-  std::vector<PhantomSite> sites;  // as of Phantom; depths are those to the skin
-  double build = kNaN;             // standard deviations of tissue, over people
+  std::vector<PhantomSite> sites;      // as of Phantom, without doubtful ones; depths to the skin
+  Vec3 nasion = Vec3::Constant(kNaN);  // on the skull, also where `sites` lacks it
+  double build = kNaN;                 // standard deviations of tissue, over people
 };
 
 // Draws a person. The face has the modes of the ICT-FaceKit model with coefficients from N(0,1).

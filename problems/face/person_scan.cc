@@ -11,7 +11,7 @@
 namespace semblance::problems {
 namespace {
 
-// The distance below a surface, > 0 inside, that need be exact only where it is less than `reach`.
+// The distance below a surface, > 0 inside, and whether the surface lies above or below at all.
 class DepthBelow {
  public:
   explicit DepthBelow(const TriMesh& mesh) : surface_(mesh) {}
@@ -39,7 +39,7 @@ class BoneLayers {
   BoneLayers(const PersonPhantom& person, const PhantomCtOptions& options)
       : skull_(person.skull),
         skin_(person.skin),
-        nasion_(std::ranges::find(person.sites, "n", &PhantomSite::site)->base),
+        nasion_(person.nasion),
         bone_mm_(options.bone_mm),
         voxel_mm_(std::cbrt(options.pixel_mm * options.pixel_mm * options.slice_mm)) {}
 

@@ -144,6 +144,14 @@ TEST(PersonPhantom, TheScanShowsBoneUnderTissueInAir) {
   EXPECT_GE(bone, static_cast<int>(First().sites.size()) - 3);
 }
 
+// The nasion of a person may be doubtful, and then it is no landmark.
+TEST(PersonPhantom, TheScanNeedsNoLandmark) {
+  const PhantomCtOptions coarse{.pixel_mm = 6, .slice_mm = 6, .threads = 2};
+  PersonPhantom without = First();
+  std::erase_if(without.sites, [](const PhantomSite& site) { return site.site == "n"; });
+  EXPECT_EQ(VoxelisePerson(without, coarse).values, VoxelisePerson(First(), coarse).values);
+}
+
 TEST(PersonPhantom, ThreadsChangeNoVoxel) {
   const PhantomCtOptions one{.pixel_mm = 6, .slice_mm = 6, .threads = 1};
   PhantomCtOptions three = one;
