@@ -137,6 +137,8 @@ def _own(parts, kind):
 
 
 def _table(file):
+    if not file.exists():
+        raise IoError(f"{file}: it is missing; `semblance report {file.parent}` makes it from the finished trials")
     try:
         import pandas
     except ImportError:

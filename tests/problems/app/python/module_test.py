@@ -311,12 +311,16 @@ class Experiments(unittest.TestCase):
         self.assertNotIn("<iframe", again._repr_html_())
         self.assertRegex(repr(run), r"<Result of phantom 1: (not )?usable, RMS error [0-9.]+ mm>")
 
+    def write_study(self, folder):
+        study = os.path.join(folder, "study.yaml")
+        with open(study, "w") as file:
+            file.write("base: %s\njob: depth\ngrid: {interp: [nearest, mean]}\nset: {subject.rings: 24}\n"
+                       "metric: depth_truth.along_direction.rms_mm\n" % os.path.join(SOURCE, "configs", "phantom.yaml"))
+        return study
+
     def test_a_study_returns_its_long_table(self):
         with tempfile.TemporaryDirectory() as folder:
-            study = os.path.join(folder, "study.yaml")
-            with open(study, "w") as file:
-                file.write("base: %s\njob: depth\ngrid: {interp: [nearest, mean]}\nset: {subject.rings: 24}\n"
-                           "metric: depth_truth.along_direction.rms_mm\n" % os.path.join(SOURCE, "configs", "phantom.yaml"))
+            study = self.write_study(folder)
             table = semblance.study(study, os.path.join(folder, "out"))
             here = os.getcwd()
             found = semblance.study(os.path.join(folder, "out"))
@@ -338,12 +342,11 @@ class Experiments(unittest.TestCase):
 
     def test_a_wide_table_has_one_row_per_trial(self):
         with tempfile.TemporaryDirectory() as folder:
-            study = os.path.join(folder, "study.yaml")
-            with open(study, "w") as file:
-                file.write("base: %s\njob: depth\ngrid: {interp: [nearest, mean]}\nset: {subject.rings: 24}\n"
-                           "metric: depth_truth.along_direction.rms_mm\n" % os.path.join(SOURCE, "configs", "phantom.yaml"))
-            wide = semblance.study(study, os.path.join(folder, "out"), wide=True)
+            wide = semblance.study(self.write_study(folder), os.path.join(folder, "out"), wide=True)
             long = semblance.study(os.path.join(folder, "out"))
+            os.remove(os.path.join(folder, "out", "trials_wide.csv"))
+            with self.assertRaisesRegex(semblance.IoError, "semblance report"):
+                semblance.study(os.path.join(folder, "out"), wide=True)
         wide, long = (table if isinstance(table, list) else table.to_dict("records") for table in (wide, long))
         self.assertEqual(len(wide), 2)
         for row in wide:
