@@ -9,6 +9,7 @@ have the true depth along the bone's mean normal within 3 mm, which is the direc
 """
 import csv
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -17,8 +18,7 @@ import numpy as np
 SEEDS = range(71, 91)  # those of schemes_on_people.yaml
 COUNTS = (64, 128)
 STUDIES = pathlib.Path(__file__).resolve().parent
-SCHEMES = ("[auto, barycentric, network_spline, nearest, mean, inverse_distance, radial_basis, moving_least_squares, natural_neighbour, "
-           "kriging, {type: kriging, distance: geodesic}, surface_matern, harmonic, biharmonic]")
+SCHEMES = re.search(r"interp: (\[.*\])", (STUDIES / "schemes_on_people.yaml").read_text())[1]
 
 
 def vertices(path):
@@ -56,6 +56,8 @@ def farthest(points, sites, count):
 
 
 def main():
+    if len(sys.argv) != 3:
+        sys.exit(__doc__)
     program, folder = sys.argv[1], pathlib.Path(sys.argv[2])
     folder.mkdir(parents=True, exist_ok=True)
     lines = [f"base: {STUDIES.parent / 'phantom.yaml'}", "job: depth", "set: {depth_truth.max_depth_mm: 40}", "subjects:"]
