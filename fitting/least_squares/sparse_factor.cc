@@ -11,6 +11,12 @@
 #include <utility>
 #include <vector>
 
+// OpenBLAS's own functions, which its header declares together with a whole BLAS.
+extern "C" {
+int openblas_get_parallel();
+void openblas_set_num_threads(int threads);
+}
+
 namespace semblance::fitting {
 namespace {
 
@@ -142,15 +148,16 @@ int NumericalRank(const SparseMatrix& lower, std::size_t rows) {
 }
 
 void UseOneLibraryThread() {
-  using SetNumber = void (*)(int);
-  const auto look_up = [](const char* name) {
-    return reinterpret_cast<SetNumber>(dlsym(RTLD_DEFAULT, name));
-  };
-  static const SetNumber set_blas_threads = look_up("openblas_set_num_threads");
-  static const SetNumber set_parallel_levels = look_up("omp_set_max_active_levels");
-  if (set_blas_threads != nullptr) {
-    set_blas_threads(1);
+  // Without threads, OpenBLAS hands the same buffer to two threads that call it at once.
+  if (openblas_get_parallel() == 0) {
+    throw Error(
+        "the OpenBLAS of this machine is built without threads, and results of concurrent fits "
+        "would be wrong; install one with threads (Debian: libopenblas0-pthread)");
   }
+  openblas_set_num_threads(1);
+  using SetNumber = void (*)(int);
+  static const auto set_parallel_levels =
+      reinterpret_cast<SetNumber>(dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
   if (set_parallel_levels != nullptr) {
     set_parallel_levels(0);
   }

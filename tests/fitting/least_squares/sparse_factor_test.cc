@@ -3,9 +3,11 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 #include "fitting/least_squares/sparse_factor.h"
@@ -182,6 +184,29 @@ TEST(SelectedInverse, OtherEntriesAreRefused) {
   const SelectedInverse inverse(lower);
   EXPECT_EQ(inverse.At(1, 1), 1);
   EXPECT_THROW(inverse.At(1, 0), std::logic_error);
+}
+
+// Concurrent fits must not share the buffers of the BLAS: a dense matrix has large supernodes.
+TEST(SparseFactor, ConcurrentSolvesGiveTheBytesOfASingleOne) {
+  const int columns = 64;
+  Random random(7);
+  Eigen::MatrixXd a(columns + 50, columns);
+  a = a.unaryExpr([&](double) { return random.Uniform(-1, 1); });
+  const SparseMatrix lower = LowerTriangle(a);
+  const Eigen::MatrixXd right = Eigen::MatrixXd::Ones(columns, 3);
+  const Eigen::MatrixXd alone = SparseFactor(lower, 0).Solve(right);
+  std::atomic<int> differences = 0;
+  {
+    std::vector<std::jthread> threads;
+    for (int k = 0; k < 8; ++k) {
+      threads.emplace_back([&] {
+        for (int n = 0; n < 2000; ++n) {
+          differences += SparseFactor(lower, 0).Solve(right) != alone ? 1 : 0;
+        }
+      });
+    }
+  }
+  EXPECT_EQ(differences, 0);
 }
 
 }  // namespace
