@@ -11,12 +11,6 @@
 #include <utility>
 #include <vector>
 
-// OpenBLAS's own functions, which its header declares together with a whole BLAS.
-extern "C" {
-int openblas_get_parallel();
-void openblas_set_num_threads(int threads);
-}
-
 namespace semblance::fitting {
 namespace {
 
@@ -147,17 +141,35 @@ int NumericalRank(const SparseMatrix& lower, std::size_t rows) {
   return static_cast<int>(std::min<std::size_t>(rank, rows));
 }
 
+namespace {
+
+// Returns a function of a loaded library, or null.
+template <typename Function>
+Function LookUp(const char* name) {
+  return reinterpret_cast<Function>(dlsym(RTLD_DEFAULT, name));
+}
+
+// OpenBLAS that is built without threads hands the same buffer to two threads that call it at once.
+bool IsOpenBlasWithoutLocks() {
+  const auto threading = LookUp<int (*)()>("openblas_get_parallel");
+  return threading != nullptr && threading() == 0;
+}
+
+}  // namespace
+
 void UseOneLibraryThread() {
-  // Without threads, OpenBLAS hands the same buffer to two threads that call it at once.
-  if (openblas_get_parallel() == 0) {
+  using SetNumber = void (*)(int);
+  static const auto set_blas_threads = LookUp<SetNumber>("openblas_set_num_threads");
+  static const auto set_parallel_levels = LookUp<SetNumber>("omp_set_max_active_levels");
+  static const bool is_without_locks = IsOpenBlasWithoutLocks();
+  if (is_without_locks) {
     throw Error(
         "the OpenBLAS of this machine is built without threads, and results of concurrent fits "
-        "would be wrong; install one with threads (Debian: libopenblas0-pthread)");
+        "would be wrong; install one with threads (Debian: libopenblas0-pthread), or remove it");
   }
-  openblas_set_num_threads(1);
-  using SetNumber = void (*)(int);
-  static const auto set_parallel_levels =
-      reinterpret_cast<SetNumber>(dlsym(RTLD_DEFAULT, "omp_set_max_active_levels"));
+  if (set_blas_threads != nullptr) {
+    set_blas_threads(1);
+  }
   if (set_parallel_levels != nullptr) {
     set_parallel_levels(0);
   }

@@ -44,12 +44,13 @@ class SparseFactor {
 // Returns -1 if there is no usable factor, for example because a number is not finite.
 int NumericalRank(const SparseMatrix& lower, std::size_t rows);
 
-// Makes OpenBLAS and OpenMP use one thread for the following calls of this thread. OpenBLAS sums in
-// an order that depends on its number of threads, and so on the machine; one thread gives the same
-// bytes everywhere, and small blocks gain nothing from more. CHOLMOD starts four OpenMP threads
-// whatever the setting, and OpenMP ends the program if the system refuses a thread; a CHOLMOD
-// without OpenMP lacks the function, so it is looked up at run time. Throws Error if OpenBLAS is
-// built without threads, because concurrent calls then share its buffers.
+// Makes OpenBLAS and OpenMP use one thread for the following calls of this thread. OpenBLAS, if the
+// sparse Cholesky uses it, sums in an order that depends on its number of threads, and so on the
+// machine; one thread gives the same bytes everywhere, and small blocks gain nothing from more.
+// CHOLMOD starts four OpenMP threads whatever the setting, and OpenMP ends the program if the
+// system refuses a thread. Both functions are looked up at run time, because other libraries lack
+// them. Throws Error if OpenBLAS is built without threads: it takes no locks, and concurrent calls
+// get each other's buffers.
 void UseOneLibraryThread();
 
 // Sums a lower triangle entry by entry. Entries wait as triplets, at most 16 MB of them, and are
