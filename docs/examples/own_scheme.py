@@ -29,9 +29,10 @@ def chin_mm(result):
     return np.mean([np.linalg.norm(face - point, axis=1).min() for point in chin])
 
 
-check_scheme(shepard, linear=True)  # the laws that built-in schemes obey too
+if __name__ == "__main__":
+    check_scheme(shepard, linear=True)  # the laws that built-in schemes obey too
 
-pathlib.Path("own.yaml").write_text(f"""
+    pathlib.Path("own.yaml").write_text(f"""
 base: {CONFIGS}/phantom.yaml
 set: {{subject.rings: 24, implicit.resolution: 60, seeds.level: 0, template.max_level: 1, first_fit: [],
       fit.plan.schedule: [{{level: 0, fraction: 1}}]}}
@@ -39,11 +40,11 @@ subjects: [{{name: a, set: {{subject.random_seed: 1}}}}, {{name: b, set: {{subje
 grid: {{interp: [mean, {{type: inverse_distance, power: 4, max_angle_deg: 180}}, shepard, {{type: shepard, power: 2}}]}}
 metric: chin_mm
 """)
-table = semblance.study("own.yaml", out="own", jobs=2, schemes=[shepard], metrics=[chin_mm], wide=True)
-errors_mm = {}
-for row in table if isinstance(table, list) else table.to_dict("records"):
-    errors_mm.setdefault(row["interp"], []).append(row["chin_mm"])
-for scheme, values in sorted(errors_mm.items(), key=lambda item: np.mean(item[1])):
-    print(f"{scheme:50s} chin {np.mean(values):.2f} mm")
-# The built-in scheme of the same formula gives the same faces.
-np.testing.assert_allclose(errors_mm["shepard"], errors_mm["inverse_distance power=4 max_angle_deg=180"], rtol=1e-6)
+    table = semblance.study("own.yaml", out="own", jobs=2, schemes=[shepard], metrics=[chin_mm], wide=True)
+    errors_mm = {}
+    for row in table if isinstance(table, list) else table.to_dict("records"):
+        errors_mm.setdefault(row["interp"], []).append(row["chin_mm"])
+    for scheme, values in sorted(errors_mm.items(), key=lambda item: np.mean(item[1])):
+        print(f"{scheme:50s} chin {np.mean(values):.2f} mm")
+    # The built-in scheme of the same formula gives the same faces.
+    np.testing.assert_allclose(errors_mm["shepard"], errors_mm["inverse_distance power=4 max_angle_deg=180"], rtol=1e-6)

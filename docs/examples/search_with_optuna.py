@@ -9,6 +9,8 @@ import argparse, concurrent.futures, functools, multiprocessing, pathlib, statis
 import optuna
 import semblance
 
+CACHE = semblance.Cache(stages=40)  # a longer schedule repeats only the fit; trials share the phantoms
+
 # A coarse run, which takes a second. Remove the first line to search at the default resolution.
 QUICK = {"subject.rings": 24, "implicit.resolution": 60, "template.max_level": 1, "uncertainty.sigma": False,
          "seeds.level": 0, "first_fit": [], "face": "fit"}
@@ -17,7 +19,7 @@ SCHEDULE = [{"level": 0, "fraction": 0.5}, {"level": 0, "fraction": 0.8}, {"leve
 
 def error_mm(given, options, phantoms, steps):  # of the faces after the first steps of the schedule, on average
     options = {**QUICK, **options, "fit.plan.schedule": SCHEDULE[:steps]}
-    runs = [semblance.run(given.config, set={**options, "subject.random_seed": seed}) for seed in phantoms]
+    runs = [semblance.run(given.config, set={**options, "subject.random_seed": seed}, cache=CACHE) for seed in phantoms]
     return statistics.mean(float("inf") if run.faults else run.number("face.rms_mm") for run in runs)
 
 

@@ -202,11 +202,7 @@ StudyRunOptions MakeRunOptions(const StudyArguments& a) {
   const Shard shard = ParseShard(a.shard);
   options.shard = shard.index;
   options.shards = shard.count;
-  options.rerun = a.rerun == "failed"           ? Rerun::kFailed
-                  : a.rerun == "unusable"       ? Rerun::kUnusable
-                  : a.rerun == "other-versions" ? Rerun::kOtherVersions
-                  : a.rerun == "all"            ? Rerun::kAll
-                                                : Rerun::kNothing;
+  options.rerun = ParseRerun(a.rerun);
   return options;
 }
 

@@ -77,6 +77,7 @@
 #include <cmath>
 #include <condition_variable>
 #include <ctime>
+#include <map>
 #include <mutex>
 #include <new>
 #include <nlohmann/json.hpp>
@@ -536,6 +537,20 @@ std::string RequireSamePlan(const fs::path& folder, const std::vector<fs::path>&
 }
 
 }  // namespace
+
+Rerun ParseRerun(const std::string& name) {
+  static const std::map<std::string, Rerun> known = {{"", Rerun::kNothing},
+                                                     {"failed", Rerun::kFailed},
+                                                     {"unusable", Rerun::kUnusable},
+                                                     {"other-versions", Rerun::kOtherVersions},
+                                                     {"all", Rerun::kAll}};
+  const auto found = known.find(name);
+  if (found == known.end()) {
+    throw ConfigError(fmt::format(
+        "rerun: '{}' is none of failed, unusable, other-versions and all", name));
+  }
+  return found->second;
+}
 
 StudySummary RunStudy(const StudyPlan& plan, const fs::path& folder, const StudyRunOptions& options,
                       const RunContext& context) {

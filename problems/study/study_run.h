@@ -19,6 +19,9 @@ namespace semblance::problems {
 // another version or build of the program made; all. A damaged trial always runs again.
 enum class Rerun { kNothing, kFailed, kUnusable, kOtherVersions, kAll };
 
+// Reads "failed", "unusable", "other-versions" or "all"; "" is kNothing. Throws ConfigError.
+Rerun ParseRerun(const std::string& name);
+
 struct StudyRunOptions {
   int jobs = 1;   // number of trials at a time, each on one thread
   int shard = 0;  // runs the trials n with n % shards == shard

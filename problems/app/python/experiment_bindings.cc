@@ -3,7 +3,9 @@
 #include <pybind11/functional.h>
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stop_token>
@@ -15,7 +17,9 @@
 #include "problems/app/python/values.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/external_schemes.h"
+#include "problems/experiment/input_contents.h"
 #include "problems/experiment/input_files.h"
+#include "problems/experiment/stage_cache.h"
 #include "problems/io/staged_folder.h"
 #include "problems/report/report_kit.h"
 #include "problems/report/result_json.h"
@@ -37,6 +41,61 @@ WhenNotEmpty MakePolicy(bool force) {
   return force ? WhenNotEmpty::kReplaceFiles : WhenNotEmpty::kRefuse;
 }
 
+// Stages that several calls of run() share. A file that changes between two calls empties it,
+// because the keys of stages have paths, not contents. Several threads may use one object.
+class SharedStages {
+ public:
+  explicit SharedStages(int capacity) : capacity_(capacity) { Clear(); }
+
+  void Clear() {
+    const std::lock_guard lock(mutex_);
+    stages_ = std::make_shared<StageCache>(capacity_);
+    contents_.clear();
+  }
+
+  // The stages for a run of this experiment, made from its input files as they are now.
+  std::shared_ptr<StageCache> For(const Experiment& experiment) {
+    InputHashes now;
+    for (const NamedFile& input : NamedFiles(experiment)) {
+      now[{input.option, input.file}] = HashContent(input, hashes_);
+    }
+    const std::lock_guard lock(mutex_);
+    const bool is_changed = std::ranges::any_of(now, [&](const auto& input) {
+      const auto known = contents_.find(input.first);
+      return known != contents_.end() && known->second != input.second;
+    });
+    if (is_changed) {
+      stages_ = std::make_shared<StageCache>(capacity_);
+      contents_.clear();
+    }
+    contents_.merge(now);
+    return stages_;
+  }
+
+  int made() const {
+    const std::lock_guard lock(mutex_);
+    return stages_->made();
+  }
+
+ private:
+  const int capacity_;
+  FileHashes hashes_;
+  mutable std::mutex mutex_;
+  std::shared_ptr<StageCache> stages_;
+  InputHashes contents_;
+};
+
+// Runs an experiment with the stages of earlier ones, if any. A file that changes during the run
+// empties them, since a stage may have been made from either content.
+RunResult RunShared(const Experiment& experiment, const RunContext& context, SharedStages* shared) {
+  if (shared == nullptr) {
+    return Run(experiment, context);
+  }
+  RunResult result = Run(experiment, context, shared->For(experiment).get());
+  shared->For(experiment);
+  return result;
+}
+
 // A page with the 3-D view of a run alone.
 std::string ViewPage(const std::string& title, const RunResult& result) {
   Report report;
@@ -50,7 +109,7 @@ std::string ViewPage(const std::string& title, const RunResult& result) {
 // that makes a page with the 3-D view.
 py::dict RunConfig(const std::string& config, const std::vector<std::string>& overrides,
                    const std::optional<std::string>& out, bool force, int threads,
-                   const py::iterable& schemes) {
+                   const py::iterable& schemes, SharedStages* shared) {
   const std::vector<NamedScheme> named = ReadSchemes(schemes);
   CheckSchemeNames(named);
   const Experiment experiment = ReadExperiment(config, overrides, named);
@@ -62,7 +121,7 @@ py::dict RunConfig(const std::string& config, const std::vector<std::string>& ov
     if (out) {
       folder.emplace(*out, MakePolicy(force), GivenTo(experiment, config, kRunFiles));
     }
-    auto found = std::make_shared<const RunResult>(Run(experiment, context));
+    auto found = std::make_shared<const RunResult>(RunShared(experiment, context, shared));
     if (folder) {
       WriteRun(experiment, *found, folder->Files(), context);
       folder->Publish();
@@ -109,7 +168,8 @@ void CheckStudyFolder(const std::string& path) {
 // StudySummary, and the ranking as text.
 py::dict RunStudyFile(const std::string& path, const std::string& out, int jobs,
                       std::pair<int, int> shard, const std::string& only,
-                      const py::iterable& schemes, const py::iterable& metrics) {
+                      const py::iterable& schemes, const py::iterable& metrics,
+                      const std::string& cache, const std::string& rerun) {
   const StudyPlan plan = ReadStudy(
       path, WithoutSubjects::kFault,
       {.schemes = ReadSchemes(schemes), .metrics = ReadMetrics(metrics), .are_files_loaded = true});
@@ -118,6 +178,8 @@ py::dict RunStudyFile(const std::string& path, const std::string& out, int jobs,
   options.shard = shard.first;
   options.shards = shard.second;
   options.only = only;
+  options.cache = cache;
+  options.rerun = ParseRerun(rerun);
   std::string ranking;
   const StudySummary summary = Interruptible([&](const std::stop_token& stop) {
     RunContext context;
@@ -141,12 +203,18 @@ py::dict RunStudyFile(const std::string& path, const std::string& out, int jobs,
 }  // namespace
 
 void BindExperiments(py::module_& module) {
+  py::class_<SharedStages>(module, "Stages")
+      .def(py::init<int>(), py::arg("capacity"))
+      .def("clear", &SharedStages::Clear)
+      .def_property_readonly("made", &SharedStages::made);
   module.def("run", &RunConfig, py::arg("config"), py::arg("overrides"), py::arg("out"),
-             py::arg("force"), py::arg("threads"), py::arg("schemes"));
+             py::arg("force"), py::arg("threads"), py::arg("schemes"),
+             py::arg("shared").none(true));
   module.def("list_plugins", &ListPlugins, py::arg("path"));
   module.def("check_study_folder", &CheckStudyFolder, py::arg("path"));
   module.def("study", &RunStudyFile, py::arg("path"), py::arg("out"), py::arg("jobs"),
-             py::arg("shard"), py::arg("only"), py::arg("schemes"), py::arg("metrics"));
+             py::arg("shard"), py::arg("only"), py::arg("schemes"), py::arg("metrics"),
+             py::arg("cache"), py::arg("rerun"));
 }
 
 }  // namespace semblance::problems

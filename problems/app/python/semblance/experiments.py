@@ -40,7 +40,37 @@ def interpolate(vertices, triangles, bases, directions, depths_mm, scheme="krigi
     return _semblance.interpolate(vertices, triangles, bases, directions, depths_mm, text, own, areas, threads)
 
 
-def run(config, set=None, out=None, force: bool = False, threads: int = 1, schemes=()) -> Result:
+class Cache:
+    """Keeps stages of `run` for later runs of this process: subject, depths, implicit face, template and face model.
+
+    A run that differs only in options of the fit then repeats only the fit and what follows. If the content of an input
+    file changes, or another scheme of the same name is given, all stages are made anew. A scheme of your own must
+    depend only on its arguments, because its result is kept.
+
+    Parameters
+    ----------
+    stages : int
+        How many stages are kept, the latest ones. A run has about eight, and takes up to a few hundred MB for a head.
+    """
+
+    def __init__(self, stages: int = 10):
+        if stages < 1:
+            raise InputError(f"stages is {stages}; it must be at least 1")
+        self._stages = _semblance.Stages(stages)
+        self._schemes = {}
+
+    def __repr__(self):
+        return f"<cache, {self._stages.made} stages made>"
+
+    def _for(self, schemes):
+        if any(self._schemes.get(scheme.name, scheme) is not scheme for scheme in schemes):
+            self._stages.clear()
+            self._schemes = {}
+        self._schemes.update((scheme.name, scheme) for scheme in schemes)
+        return self._stages
+
+
+def run(config, set=None, out=None, force: bool = False, threads: int = 1, schemes=(), cache=None) -> Result:
     """Run an experiment, as `semblance run` does.
 
     Parameters
@@ -55,6 +85,8 @@ def run(config, set=None, out=None, force: bool = False, threads: int = 1, schem
         Whether files of the same name in a folder that is not empty are replaced.
     schemes : list of Scheme
         Your own schemes, which `interp` may then name.
+    cache : Cache, optional
+        Keeps what later runs can use again.
 
     Returns
     -------
@@ -63,14 +95,17 @@ def run(config, set=None, out=None, force: bool = False, threads: int = 1, schem
     """
     overrides = [f"{path}={option_text(value)}" for path, value in (set or {}).items()]
     out = None if out is None else os.fspath(out)
+    if cache is not None and not isinstance(cache, Cache):
+        raise TypeError(f"cache is a {type(cache).__name__}; give a semblance.Cache()")
+    own = _own(schemes, Scheme)
     try:
-        parts = _semblance.run(_file(config), overrides, out, force, threads, _own(schemes, Scheme))
+        parts = _semblance.run(_file(config), overrides, out, force, threads, own, cache and cache._for(own))
     except IoError as error:
         raise IoError(str(error).replace("add --force", "pass force=True")) from None
     return Result(json.loads(parts["numbers"]), parts["arrays"], parts["faults"], parts["page"])
 
 
-def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "", wide: bool = False):
+def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "", wide: bool = False, cache="", rerun: str = ""):
     """Run the unfinished trials of a study, or read the table of a finished one.
 
     Parameters
@@ -89,6 +124,10 @@ def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "",
     wide : bool
         Whether a row of the table is a trial with all its metrics. Otherwise it is one metric of one trial, in the
         columns `metric` and `value`, and there are hundreds of rows per trial.
+    cache : str or path
+        Folder of implicit faces, which is shared with other calls and processes.
+    rerun : str
+        Finished trials that run again: "failed", "unusable", "other-versions" or "all".
 
     Returns
     -------
@@ -104,20 +143,20 @@ def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "",
         _semblance.check_study_folder(os.fspath(path))
         return _table(pathlib.Path(path) / table)
     out = pathlib.Path("out", pathlib.Path(path).stem) if out is None else pathlib.Path(out)
-    counts = run_study(path, out, jobs, (0, 1), only, schemes, metrics)
+    counts = run_study(path, out, jobs, (0, 1), only, schemes, metrics, os.fspath(cache), rerun)
     if counts["failed"]:
         warnings.warn(f"{counts['failed']} of {counts['trials']} trials failed; the table's column 'reason' states why", stacklevel=2)
     return _table(out / table)
 
 
-def run_study(path, out, jobs, shard, only, schemes, metrics):
+def run_study(path, out, jobs, shard, only, schemes, metrics, cache="", rerun=""):
     """Run a shard (index, count) of a study with its plugins; return the counts of its trials and the ranking."""
     schemes, metrics = _own(schemes, Scheme), _own(metrics, Metric)
     for file in _semblance.list_plugins(os.fspath(path)):
         more_schemes, more_metrics = load_plugins(file)
         schemes += more_schemes
         metrics += more_metrics
-    return _semblance.study(os.fspath(path), os.fspath(out), jobs, shard, only, schemes, metrics)
+    return _semblance.study(os.fspath(path), os.fspath(out), jobs, shard, only, schemes, metrics, cache, rerun)
 
 
 def _file(path):

@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """An estimator in the style of scikit-learn, which need not be installed."""
+import warnings
+
 import numpy as np
 
 from .points import fit
@@ -68,7 +70,10 @@ class SurfaceRegressor(*(_plain_base() if BaseEstimator is None else (RegressorM
         self.threads = threads
 
     def fit(self, X, y, sample_weight=None):
-        """Fit the surface to heights y at places X, an array of shape (n, 2). Returns the estimator."""
+        """Fit the surface to heights y at places X, an array of shape (n, 2). Returns the estimator.
+
+        Faults and notes of the fit become warnings.
+        """
         X, y = self._check_table(X, y)
         weights = None if sample_weight is None else np.asarray(sample_weight, float)
         if weights is not None and weights.shape != y.shape:
@@ -83,6 +88,8 @@ class SurfaceRegressor(*(_plain_base() if BaseEstimator is None else (RegressorM
         points, weights = _spread(points, weights)
         self.fit_ = fit(points, weights=weights, threads=self.threads, **{**HEIGHTS, **(self.options or {})})
         self.low_, self.high_ = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
+        for words in (*self.fit_.faults, *self.fit_.notes):
+            warnings.warn(words, stacklevel=2)
         return self
 
     def predict(self, X, return_std=False):

@@ -311,6 +311,47 @@ class Experiments(unittest.TestCase):
         self.assertNotIn("<iframe", again._repr_html_())
         self.assertRegex(repr(run), r"<Result of phantom 1: (not )?usable, RMS error [0-9.]+ mm>")
 
+    # A cached run equals one without a cache, whatever ran before.
+    def test_a_cache_changes_no_result(self):
+        config, cache = os.path.join(SOURCE, "configs", "phantom.yaml"), semblance.Cache(stages=30)
+        quick = {**self.QUICK, "subject.rings": 20, "uncertainty.sigma": False}
+        for changed in ({}, {"fit.plan.schedule": [{"level": 0, "fraction": 0.5}]}, {"interp": "mean"}, {"subject.random_seed": 2}):
+            self.assertEqual(semblance.run(config, set={**quick, **changed}, cache=cache), semblance.run(config, set={**quick, **changed}))
+        made = cache._stages.made
+        semblance.run(config, set={**quick, "fit.plan.schedule": [{"level": 1, "fraction": 0.5}]}, cache=cache)
+        semblance.run(config, set=quick, cache=cache)
+        self.assertEqual(cache._stages.made, made)
+        self.assertEqual(repr(cache), f"<cache, {made} stages made>")
+
+    def test_a_cache_notices_changed_files_and_schemes(self):
+        def mean_scheme(factor):
+            @semblance.scheme("own")
+            def own(given):
+                return np.full(len(given.vertices), factor * given.depths_mm.mean())
+            return own
+
+        config, cache = os.path.join(SOURCE, "configs", "phantom.yaml"), semblance.Cache()
+        quick = {**self.QUICK, "subject.rings": 20, "uncertainty.sigma": False}
+        one, other = mean_scheme(1), mean_scheme(1.5)
+        own = [semblance.run(config, set={**quick, "interp": "own"}, schemes=[scheme], cache=cache).depth_mm for scheme in (one, other, one)]
+        np.testing.assert_allclose(own[1], 1.5 * own[0])
+        np.testing.assert_array_equal(own[2], own[0])
+        with open(os.path.join(SOURCE, "configs", "tables", "rhine_black.yaml")) as file:
+            text = file.read()
+        with tempfile.TemporaryDirectory() as folder:
+            table, depths = os.path.join(folder, "table.yaml"), []
+            for mean in ("5.00", "8.00"):  # of supraglabella
+                with open(table, "w") as file:
+                    file.write(text.replace("normal_male: {mean: 5.00}", f"normal_male: {{mean: {mean}}}", 1))
+                given = {**quick, "tissue.depths": "table", "tissue.table": table}
+                depths.append(semblance.run(config, set=given, cache=cache).depth_mm)
+                np.testing.assert_array_equal(depths[-1], semblance.run(config, set=given).depth_mm)
+        self.assertGreater(np.nanmax(depths[1] - depths[0]), 1)
+        with self.assertRaisesRegex(TypeError, "semblance.Cache"):
+            semblance.run(config, cache=True)
+        with self.assertRaisesRegex(semblance.InputError, "at least 1"):
+            semblance.Cache(0)
+
     def write_study(self, folder):
         study = os.path.join(folder, "study.yaml")
         with open(study, "w") as file:

@@ -49,6 +49,14 @@ class Regressor(unittest.TestCase):
         self.assertTrue(np.isneginf(low).all() and np.isposinf(high).all())
         self.assertTrue(np.isfinite(regressor.predict(places, return_std=True)[1]).all())
 
+    def test_notes_of_the_fit_are_warnings(self):
+        places, heights, _ = table(400, 5)
+        random = np.random.default_rng(6)
+        heights += np.where(random.random(400) < 0.3, random.normal(0, 300, 400), 0)
+        with self.assertWarnsRegex(UserWarning, "long tail"):
+            regressor = semblance.SurfaceRegressor().fit(places, heights)
+        self.assertEqual(len(regressor.fit_.notes), 1)
+
     def test_parameters_are_those_of_the_constructor(self):
         regressor = semblance.SurfaceRegressor(level=0.5)
         self.assertEqual(regressor.get_params(), {"options": None, "level": 0.5, "threads": 1})
