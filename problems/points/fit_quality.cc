@@ -15,8 +15,9 @@
 namespace semblance::problems {
 namespace {
 
-bool LieOnLine(std::span<const Vec3> positions) {
-  constexpr double kNarrow = 1e-4;  // share of the mean squares across the line
+// The mean squares of the points' distances from their mean along three axes, ascending: the first
+// one is that of the distances from the best plane.
+Vec3 MeanSquares(std::span<const Vec3> positions) {
   Vec3 mean = Vec3::Zero();
   for (const Vec3& p : positions) {
     mean += p / static_cast<double>(positions.size());
@@ -25,8 +26,8 @@ bool LieOnLine(std::span<const Vec3> positions) {
   for (const Vec3& p : positions) {
     moments += (p - mean) * (p - mean).transpose();
   }
-  const Vec3 squares = Eigen::SelfAdjointEigenSolver<Mat3>(moments).eigenvalues();
-  return squares[1] < kNarrow * squares[2];
+  return Eigen::SelfAdjointEigenSolver<Mat3>(moments).eigenvalues() /
+         static_cast<double>(positions.size());
 }
 
 // The noise of a point of mean weight over its given sigma. The weights are 1 / sigma^2; the mean
@@ -107,7 +108,10 @@ GivenPoints KeepFacts(const PointTable& table, ParameterSource source,
   for (const Vec3& p : table.positions) {
     given.box.extend(p);
   }
-  given.on_line = LieOnLine(table.positions);
+  constexpr double kNarrow = 1e-4;  // share of the mean squares across a line
+  const Vec3 squares = MeanSquares(table.positions);
+  given.on_line = squares[1] < kNarrow * squares[2];
+  given.plane_rms = std::sqrt(std::max(0.0, squares[0]));
   std::ranges::transform(exact, std::back_inserter(given.exact_uv), &ExactPoint::uv);
   return given;
 }
@@ -149,6 +153,23 @@ std::string TailText(const FitResult& fit, std::string_view unit) {
                    "surface follows them; clean the points, and fit again",
                    LengthText(median_mm, unit, 3), LengthText(rms_mm, unit, 3))
              : "";
+}
+
+std::string ReliefText(const GivenPoints& given, const PointFit& result) {
+  // A relief of 2 % of the extent is far above the noise of measured points, so that a noisy plane
+  // gets no note.
+  constexpr double kUnexplained = 0.85, kRelief = 0.02;
+  const double extent = given.box.diagonal().norm(), left = result.off * extent / given.plane_rms;
+  if (given.plane_rms < kRelief * extent || !(left > kUnexplained)) {
+    return "";
+  }
+  return fmt::format(
+      "the points lie as far from the surface as from a plane ({:.0f} %): the surface shows "
+      "nothing "
+      "of their relief; check that the numbers of each row belong to one point, since a column "
+      "that "
+      "was sorted by itself has this effect",
+      100 * left);
 }
 
 std::string WeightText(const GivenPoints& given, const FitResult& fit, std::string_view unit) {

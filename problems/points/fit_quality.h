@@ -21,6 +21,7 @@ struct GivenPoints {
   bool has_uv = false;
   bool on_line = false;  // heights alone, without places
   bool has_sigma = false;
+  double plane_rms = kNaN;  // of the distances from the best plane, in the fit's coordinates
 };
 
 GivenPoints KeepFacts(const PointTable& table, ParameterSource source,
@@ -34,6 +35,10 @@ void CompareDistances(const GivenPoints& given, PointFit& result);
 // States that a part of the points lies much farther from the surface than most; empty if none
 // does, or if those are outliers.
 std::string TailText(const FitResult& fit, std::string_view unit);
+
+// States that the surface is no nearer to the points than a plane, although they have relief; empty
+// otherwise.
+std::string ReliefText(const GivenPoints& given, const PointFit& result);
 
 // States that points of great weight lie farther from the surface than those of small weight, as if
 // the weights were standard deviations; empty if they do not, or if a column sigma gave them.

@@ -211,11 +211,12 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
     AddSigma(given, start, step, result);
   }
   ConvertWeights(options.fit.terms, result.fit);
-  if (std::string tail = TailText(result.fit, options.unit); !tail.empty()) {
-    notes.push_back(std::move(tail));
-  }
-  if (std::string text = WeightText(given, result.fit, options.unit); !text.empty()) {
-    notes.push_back(std::move(text));
+  for (std::string text :
+       {TailText(result.fit, options.unit), WeightText(given, result.fit, options.unit),
+        ReliefText(given, result)}) {
+    if (!text.empty()) {
+      notes.push_back(std::move(text));
+    }
   }
   if (!result.attributes.empty()) {
     result.attributes = std::move(given_attributes);

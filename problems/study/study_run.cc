@@ -546,8 +546,8 @@ Rerun ParseRerun(const std::string& name) {
                                                      {"all", Rerun::kAll}};
   const auto found = known.find(name);
   if (found == known.end()) {
-    throw ConfigError(fmt::format(
-        "rerun: '{}' is none of failed, unusable, other-versions and all", name));
+    throw ConfigError(
+        fmt::format("rerun: '{}' is none of failed, unusable, other-versions and all", name));
   }
   return found->second;
 }

@@ -581,6 +581,27 @@ TEST(PointFit, FilesOfTheFieldGiveTheRightResult) {
   EXPECT_THAT(told.how, HasSubstr("coordinates in different units"));
 }
 
+// A column that was sorted by itself leaves each coordinate as it was, but no surface.
+TEST(PointFit, AColumnSortedByItselfGetsANote) {
+  const PointTable table = Hills(800, 60, 0.05, 9);
+  const auto notes = [](const PointTable& points) {
+    return ::testing::PrintToString(FitPoints(points, {}, {}).notes);
+  };
+  EXPECT_THAT(notes(table), ::testing::Not(HasSubstr("nothing of their relief")));
+  for (const int axis : {0, 2}) {
+    std::vector<double> column;
+    for (const Vec3& p : table.positions) {
+      column.push_back(p[axis]);
+    }
+    std::ranges::sort(column);
+    PointTable sorted = table;
+    for (std::size_t k = 0; k < column.size(); ++k) {
+      sorted.positions[k][axis] = column[k];
+    }
+    EXPECT_THAT(notes(sorted), HasSubstr("nothing of their relief")) << axis;
+  }
+}
+
 // The same surface within the noise, for points in another order, mirrored, scaled or shifted.
 TEST(PointFit, LawsOfTheSamePoints) {
   const PointTable table = Hills(800, 60, 0.05, 9);
