@@ -394,6 +394,21 @@ class Experiments(unittest.TestCase):
             same = [other["value"] for other in long if other["interp"] == row["interp"] and other["metric"] == "depth_truth.along_direction.rms_mm"]
             self.assertEqual(same, [row["depth_truth.along_direction.rms_mm"]])
 
+    def test_a_study_runs_trials_again_only_if_asked(self):
+        with tempfile.TemporaryDirectory() as folder:
+            study, out = self.write_study(folder), os.path.join(folder, "out")
+
+            def written(**options):
+                semblance.study(study, out, **options)
+                trials = os.path.join(out, "trials")
+                return {name: os.stat(os.path.join(trials, name, "trial.json")).st_mtime_ns for name in os.listdir(trials)}
+
+            first, kept, again = written(), written(), written(rerun="all")
+            with self.assertRaisesRegex(semblance.ConfigError, "'fialed' is none of failed, unusable"):
+                semblance.study(study, out, rerun="fialed")
+        self.assertEqual(kept, first)
+        self.assertTrue(all(again[name] > first[name] for name in first))
+
     def test_wrong_arguments_name_the_remedy(self):
         def plain(given):
             return given.depths_mm
