@@ -165,10 +165,8 @@ std::string ReliefText(const GivenPoints& given, const PointFit& result) {
   }
   return fmt::format(
       "the points lie as far from the surface as from a plane ({:.0f} %): the surface shows "
-      "nothing "
-      "of their relief; check that the numbers of each row belong to one point, since a column "
-      "that "
-      "was sorted by itself has this effect",
+      "nothing of their relief; check that the numbers of each row belong to one point, since a "
+      "column that was sorted by itself has this effect",
       100 * left);
 }
 
