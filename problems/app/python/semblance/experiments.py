@@ -140,6 +140,8 @@ def study(path, out=None, jobs: int = 1, schemes=(), metrics=(), only: str = "",
     if os.path.isdir(path):
         if out is not None:
             raise InputError(f"{path}: this is the folder of a study, which is only read; omit 'out'")
+        if cache or rerun:
+            raise InputError(f"{path}: this is the folder of a study, which is only read; 'cache' and 'rerun' need its YAML file")
         _semblance.check_study_folder(os.fspath(path))
         return _table(pathlib.Path(path) / table)
     out = pathlib.Path("out", pathlib.Path(path).stem) if out is None else pathlib.Path(out)

@@ -406,6 +406,8 @@ class Experiments(unittest.TestCase):
             first, kept, again = written(), written(), written(rerun="all")
             with self.assertRaisesRegex(semblance.ConfigError, "'fialed' is none of failed, unusable"):
                 semblance.study(study, out, rerun="fialed")
+            with self.assertRaisesRegex(semblance.InputError, "need its YAML file"):
+                semblance.study(out, rerun="all")
         self.assertEqual(kept, first)
         self.assertTrue(all(again[name] > first[name] for name in first))
 
