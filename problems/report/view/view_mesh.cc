@@ -2,68 +2,53 @@
 #include "problems/report/view/view_mesh.h"
 
 #include <fmt/format.h>
+#include <meshoptimizer.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <utility>
 
 #include "problems/io/manifest.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
-#include "surfaces/decimate/decimate.h"
 
 namespace semblance::problems {
-namespace {
-
-// Keeps one vertex per cell of a grid.
-TriMesh ClusterForView(const TriMesh& mesh, double cell_mm) {
-  std::map<std::array<long, 3>, std::int32_t> of_cell;
-  std::vector<std::int32_t> to(mesh.points.size());
-  TriMesh out;
-  for (std::size_t v = 0; v < to.size(); ++v) {
-    const Vec3 at = mesh.points[v] / cell_mm;
-    const auto [it, is_new] =
-        of_cell.try_emplace({std::lround(at.x()), std::lround(at.y()), std::lround(at.z())},
-                            static_cast<std::int32_t>(out.points.size()));
-    if (is_new) {
-      out.points.push_back(mesh.points[v]);
-    }
-    to[v] = it->second;
-  }
-  for (const Triangle& t : mesh.triangles) {
-    const Triangle s = {to[t[0]], to[t[1]], to[t[2]]};
-    if (s[0] != s[1] && s[1] != s[2] && s[2] != s[0]) {
-      out.triangles.push_back(s);
-    }
-  }
-  return out;
-}
-
-}  // namespace
-
 TriMesh SimplifyForView(const TriMesh& mesh, int most_triangles) {
-  if (static_cast<int>(mesh.triangles.size()) <= most_triangles) {
+  const auto most = static_cast<std::size_t>(most_triangles);
+  if (mesh.triangles.size() <= most) {
     return mesh;
   }
-  // A few times more triangles than in the end show nearly every detail that remains then, so the
-  // way to them need not be measured. More take longer and need not be closer; with twice as many
-  // as in the end, the worst place of a skull moved by 3.9 instead of 2.2 mm
-  // (docs/experiments/performance.md).
-  constexpr int kRough = 3;
-  try {
-    const bool is_large = static_cast<int>(mesh.triangles.size()) > kRough * most_triangles;
-    const TriMesh rough = is_large ? Decimate(mesh, {.target_triangles = kRough * most_triangles,
-                                                     .check = DecimateCheck::kNone})
-                                         .mesh
-                                   : TriMesh{};
-    return Decimate(is_large ? rough : mesh, {.target_triangles = most_triangles}).mesh;
-  } catch (const InputError&) {  // a scan may hold edges that Decimate refuses
-    // The cell edge for about most_triangles on a smooth surface. It need not be exact.
-    return ClusterForView(mesh, std::sqrt(2.3 * Area(mesh) / most_triangles));
+  // meshoptimizer takes floats, so the coordinates count from the mesh, not from a map's origin.
+  const Vec3 origin = Bounds(mesh).min();
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(mesh.points.size());
+  for (const Vec3& point : mesh.points) {
+    points.emplace_back((point - origin).cast<float>());
   }
+  std::vector<unsigned> from;
+  from.reserve(3 * mesh.triangles.size());
+  for (const Triangle& triangle : mesh.triangles) {
+    from.insert(from.end(), triangle.begin(), triangle.end());
+  }
+  constexpr float kAnyError = 1;  // of the extent: the number of triangles is the only limit
+  constexpr std::size_t kFewTimes = 2;
+  const float* const coordinates = points.front().data();
+  std::vector<unsigned> corners(from.size());
+  std::size_t kept = meshopt_simplify(corners.data(), from.data(), from.size(), coordinates,
+                                      points.size(), sizeof(points.front()), 3 * most, kAnyError);
+  if (kept > kFewTimes * 3 * most) {  // a mesh of many small pieces, none of which it gives up
+    kept = meshopt_simplifySloppy(corners.data(), from.data(), from.size(), coordinates,
+                                  points.size(), sizeof(points.front()), 3 * most, kAnyError);
+  }
+  TriMesh simple = {.points = mesh.points, .triangles = {}};
+  for (std::size_t k = 0; k < kept; k += 3) {
+    const auto corner = [&](std::size_t i) { return static_cast<std::int32_t>(corners[k + i]); };
+    simple.triangles.push_back({corner(0), corner(1), corner(2)});
+  }
+  DropUnusedPoints(simple);
+  return simple;
 }
 
 // ---------------------------------------------------------------------------------------------

@@ -15,8 +15,8 @@ namespace semblance::problems {
 
 inline constexpr int kViewTriangles = 24000;  // enough for one mesh of a report on a screen
 
-// Reduces any mesh to about `most_triangles`. A mesh that cannot be decimated, e.g. because it is
-// not a manifold, gets one vertex per cell of a grid instead.
+// Reduces any mesh to about `most_triangles` of its own vertices, without a bound on the distance:
+// it is a picture. A mesh of many small pieces may keep twice as many.
 TriMesh SimplifyForView(const TriMesh& mesh, int most_triangles = kViewTriangles);
 
 // Collects blobs of geometry. Each Add returns the name of its blob, a hash of the content, so
