@@ -84,6 +84,18 @@ std::vector<double> CountedDistances(const FitResult& fit) {
   return distances_mm;
 }
 
+// The distances times the roots of the weights: over the deviations, up to a factor. Without
+// weights, the distances.
+std::vector<double> WeightedDistances(const FitResult& fit, std::span<const double> weights) {
+  std::vector<double> distances;
+  for (std::uint32_t k = 0; k < fit.residual_mm.size(); ++k) {
+    if (!IsOutlier(fit, k)) {
+      distances.push_back(fit.residual_mm[k] * (weights.empty() ? 1 : std::sqrt(weights[k])));
+    }
+  }
+  return distances;
+}
+
 // The same as RootMeanSquare(CountedDistances(fit)), with weights.
 double WeightedRms(const FitResult& fit, std::span<const double> weights) {
   double sum = 0, all = 0;
@@ -136,7 +148,7 @@ void CompareDistances(const GivenPoints& given, PointFit& result) {
   result.rms_of_all_mm = RootMeanSquare(result.fit.residual_mm);
 }
 
-std::string TailText(const FitResult& fit, std::string_view unit) {
+std::string TailText(const GivenPoints& given, const FitResult& fit, std::string_view unit) {
   constexpr double kLongTail = 3;  // RMS over median; 1.5 for normal errors, 2 for Laplace's
   if (!fit.automatic || fit.automatic->met_to_rounding) {
     return "";
@@ -146,7 +158,10 @@ std::string TailText(const FitResult& fit, std::string_view unit) {
     return "";
   }
   const double rms_mm = RootMeanSquare(distances), median_mm = UpperMedian(distances);
-  return rms_mm > kLongTail * median_mm
+  // Points of very different weights have a long tail without gross errors.
+  std::vector<double> weighted = WeightedDistances(fit, given.weights);
+  const double weighted_rms = RootMeanSquare(weighted), weighted_median = UpperMedian(weighted);
+  return rms_mm > kLongTail * median_mm && weighted_rms > kLongTail * weighted_median
              ? fmt::format(
                    "the distances have a long tail: half of the points lie within {}, and the RMS "
                    "is {}; many points may be gross errors that were not recognised, and the "

@@ -34,7 +34,7 @@ void CompareDistances(const GivenPoints& given, PointFit& result);
 
 // States that a part of the points lies much farther from the surface than most; empty if none
 // does, or if those are outliers.
-std::string TailText(const FitResult& fit, std::string_view unit);
+std::string TailText(const GivenPoints& given, const FitResult& fit, std::string_view unit);
 
 // States that the surface is no nearer to the points than a plane, although they have relief; empty
 // otherwise.

@@ -212,7 +212,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   }
   ConvertWeights(options.fit.terms, result.fit);
   for (std::string text :
-       {TailText(result.fit, options.unit), WeightText(given, result.fit, options.unit),
+       {TailText(given, result.fit, options.unit), WeightText(given, result.fit, options.unit),
         ReliefText(given, result)}) {
     if (!text.empty()) {
       notes.push_back(std::move(text));

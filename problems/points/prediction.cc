@@ -37,12 +37,29 @@ GraphMap RequireGraph(const HSplineSurface& surface) {
   return *map;
 }
 
-double MeanSquare(std::span<const double> values) {
+// The weight of a point over the mean weight; 1 if all points count alike. Its error has the
+// variance of a point of mean weight over this.
+double RelativeWeight(const HeightEvidence& evidence, double mean_weight, std::size_t point) {
+  return evidence.weights.empty() ? 1 : evidence.weights[point] / mean_weight;
+}
+
+double MeanWeight(const HeightEvidence& evidence) {
   double sum = 0;
-  for (const double value : values) {
-    sum += value * value;
+  for (const double weight : evidence.weights) {
+    sum += weight;
   }
-  return sum / static_cast<double>(values.size());
+  return evidence.weights.empty() ? 1 : sum / static_cast<double>(evidence.weights.size());
+}
+
+// The mean square of the distances with the points' weights, as that of HeightEvidence::noise_mm.
+double WeightedMeanSquare(const HeightEvidence& evidence) {
+  const double mean_weight = MeanWeight(evidence);
+  double sum = 0;
+  for (std::size_t k = 0; k < evidence.residual_mm.size(); ++k) {
+    sum += RelativeWeight(evidence, mean_weight, k) * evidence.residual_mm[k] *
+           evidence.residual_mm[k];
+  }
+  return sum / static_cast<double>(evidence.residual_mm.size());
 }
 
 int CellAt(const Vec2& uv, int across) {
@@ -95,33 +112,44 @@ HeightPredictor::HeightPredictor(HSplineSurface surface, std::optional<HeightEvi
 }
 
 // Cells of about 64 points. A cell's mean square counts with sixteen points' worth of that of all,
-// which trades the detail of the noise for its error (12 % with 64 points). The parameters that the
-// fit spent make residuals smaller than the noise everywhere alike.
+// which trades the detail of the noise for its error (12 % with 64 points). Distances count with
+// their weights, so that points of known and different deviations do not pass for noise that varies
+// beyond them. The parameters that the fit spent make residuals smaller than the noise everywhere
+// alike.
 HeightPredictor::NoiseGrid HeightPredictor::FindNoise() const {
   constexpr double kPointsPerCell = 64, kPointsOfAll = 16;
   constexpr int kMostAcross = 64;
   const std::vector<double>& residuals = evidence_->residual_mm;
-  NoiseGrid grid{
-      .across = std::clamp(
-          static_cast<int>(std::sqrt(static_cast<double>(residuals.size()) / kPointsPerCell)), 1,
-          kMostAcross),
-      .sd = {}};
-  const std::size_t cells = static_cast<std::size_t>(grid.across) * grid.across;
-  const double all = MeanSquare(residuals),
+  const int across = std::clamp(
+      static_cast<int>(std::sqrt(static_cast<double>(residuals.size()) / kPointsPerCell)), 1,
+      kMostAcross);
+  const std::size_t cells = static_cast<std::size_t>(across) * across;
+  const double mean_weight = MeanWeight(*evidence_), all = WeightedMeanSquare(*evidence_),
                spent = all > 0 ? evidence_->noise_mm * evidence_->noise_mm / all : 1;
-  std::vector<double> squares(cells, kPointsOfAll * all), counts(cells, kPointsOfAll);
+  std::vector<double> squares(cells, kPointsOfAll * all), counts(cells, 0), variances(cells, 0);
+  double variance_of_all = 0;
   for (std::size_t k = 0; k < residuals.size(); ++k) {
-    const int cell = CellAt(evidence_->uv[k], grid.across);
-    squares[cell] += residuals[k] * residuals[k];
+    const int cell = CellAt(evidence_->uv[k], across);
+    const double weight = RelativeWeight(*evidence_, mean_weight, k);
+    squares[cell] += weight * residuals[k] * residuals[k];
     counts[cell] += 1;
+    variances[cell] += 1 / weight;
+    variance_of_all += 1 / weight / static_cast<double>(residuals.size());
   }
+  NoiseGrid grid{.across = across, .of_mean_weight = {}, .sd = {}};
   for (std::size_t cell = 0; cell < cells; ++cell) {
-    grid.sd.push_back(std::sqrt(spent * squares[cell] / counts[cell]));
+    const double variance = counts[cell] > 0 ? variances[cell] / counts[cell] : variance_of_all;
+    grid.of_mean_weight.push_back(std::sqrt(spent * squares[cell] / (counts[cell] + kPointsOfAll)));
+    grid.sd.push_back(grid.of_mean_weight.back() * std::sqrt(variance));
   }
   return grid;
 }
 
 double HeightPredictor::NoiseGrid::At(const Vec2& uv) const { return sd[CellAt(uv, across)]; }
+
+double HeightPredictor::NoiseGrid::OfMeanWeightAt(const Vec2& uv) const {
+  return of_mean_weight[CellAt(uv, across)];
+}
 
 // A place is supported if the surface is known at least as well as by one observation, or if its sd
 // is at most twice the 95 % quantile of the points'. The latter keeps borders of data without
@@ -150,7 +178,7 @@ double IntervalFactor(const HeightEvidence& evidence, const NoiseAt& noise_at, d
     }
   }
   const double spent =
-      evidence.noise_mm / std::sqrt(std::max(MeanSquare(evidence.residual_mm), 1e-300));
+      evidence.noise_mm / std::sqrt(std::max(WeightedMeanSquare(evidence), 1e-300));
   return relative.empty() ? 0 : spent * Quantile(relative, level);
 }
 
@@ -184,7 +212,8 @@ PredictedHeights HeightPredictor::At(std::span<const Vec2> xy, double level, int
     heights.supported[k] = !evidence_ || sd[n] <= limit_ ? 1 : 0;
     if (evidence_) {
       const double noise = noise_.At(uv[n]);
-      const double rougher = evidence_->noise_mm > 0 ? noise / evidence_->noise_mm : 1;
+      const double rougher =
+          evidence_->noise_mm > 0 ? noise_.OfMeanWeightAt(uv[n]) / evidence_->noise_mm : 1;
       heights.sd[k] = sd[n] * rougher / std::sqrt(evidence_->effective_share);
       const double half = factor * std::hypot(noise, heights.sd[k]);
       heights.low[k] = heights.z[k] - half;

@@ -39,7 +39,8 @@ struct PredictedHeights {
 //   sd: the error of the surface (surface_sigma.h), times the ratio of the noise around the place
 //   to the noise of all points, and over the square root of the effective share of the points.
 //   interval: z -+ q sqrt(noise^2 + sd^2), where q is the quantile of the points' own distances
-//   over the noise around them, so that it holds for long tails too. supported: the surface is
+//   over the noise around them, so that it holds for long tails too. A new observation is assumed
+//   to be as exact as the points around it. supported: the surface is
 //   known at least as well as by one observation, or nearly as well as at the points. Without
 //   evidence: within the domain.
 class HeightPredictor {
@@ -52,11 +53,13 @@ class HeightPredictor {
   const GraphMap& map() const { return map_; }
 
  private:
-  // The noise by cells of a grid over the domain.
+  // The noise by cells of a grid over the domain, row by row: of a point of mean weight, and of a
+  // new observation, whose weight is like those of the points in the cell.
   struct NoiseGrid {
     int across = 1;
-    std::vector<double> sd;  // row by row
+    std::vector<double> of_mean_weight, sd;
     double At(const Vec2& uv) const;
+    double OfMeanWeightAt(const Vec2& uv) const;
   };
   NoiseGrid FindNoise() const;
   double FindLimit() const;

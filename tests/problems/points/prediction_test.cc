@@ -22,7 +22,9 @@
 namespace semblance::problems {
 namespace {
 
+using ::testing::Contains;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 // A hill and a valley over a map in degrees, in metres.
 double HillAt(const Vec2& at) {
@@ -141,6 +143,47 @@ TEST(Prediction, IntervalsHoldTheirShare) {
     of_both += holds / 2;
   }
   EXPECT_NEAR(of_both, 0.9, 0.05);
+}
+
+// Deviations that are given and right: intervals hold their share of new observations of the same
+// deviations and of the truth, also where those differ tenfold, side by side or mixed, and no note
+// takes them for gross errors.
+TEST(Prediction, IntervalsHoldTheirShareWithGivenDeviations) {
+  constexpr int kPlaces = 1500;
+  for (const bool mixed : {false, true}) {
+    PointTable table = MapTable(6000, 0, 8);
+    Random random(11);
+    const auto deviation_at = [&](double x) {
+      return (mixed ? random.Uniform(0, 1) < 0.5 : x < 249) ? 4.0 : 40.0;
+    };
+    table.weights_of_sigma = true;
+    for (Vec3& p : table.positions) {
+      const double sigma = deviation_at(p.x());
+      p.z() += sigma * random.Normal();
+      table.weights.push_back(1 / (sigma * sigma));
+    }
+    const PointFit fit = FitPoints(table, {}, {});
+    EXPECT_NEAR(fit.sigma_factor, 1, 0.1);
+    EXPECT_THAT(fit.notes, Not(Contains(HasSubstr("gross errors"))));
+    const HeightPredictor predictor(fit.fit.surface, CollectEvidence(fit));
+    for (const bool right : {false, true}) {
+      std::vector<Vec2> places;
+      for (int k = 0; k < kPlaces; ++k) {
+        places.emplace_back(right ? random.Uniform(249.3, 252.9) : random.Uniform(245.1, 248.7),
+                            random.Uniform(22.1, 26.9));
+      }
+      const PredictedHeights heights = predictor.At(places, 0.9, 1);
+      double holds = 0, holds_truth = 0;
+      for (std::size_t k = 0; k < places.size(); ++k) {
+        const double truth = HillAt(places[k]),
+                     observed = truth + deviation_at(places[k].x()) * random.Normal();
+        holds += observed > heights.low[k] && observed < heights.high[k] ? 1.0 / kPlaces : 0;
+        holds_truth += std::abs(truth - heights.z[k]) < 1.645 * heights.sd[k] ? 1.0 / kPlaces : 0;
+      }
+      EXPECT_NEAR(holds, 0.9, 0.05) << mixed << right;
+      EXPECT_GT(holds_truth, 0.8) << mixed << right;
+    }
+  }
 }
 
 // Two places with points: the values between them, and beyond all points, are flagged.
