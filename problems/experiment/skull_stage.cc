@@ -8,6 +8,8 @@
 #include <span>
 #include <string>
 #include <type_traits>
+#include <utility>
+#include <variant>
 
 #include "problems/experiment/dowel_projection.h"
 #include "problems/experiment/experiment_config.h"
@@ -17,6 +19,7 @@
 #include "problems/subject/average_skull.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/encoding.h"
+#include "surfaces/base/error.h"
 #include "surfaces/mesh/refine_mesh.h"
 
 namespace semblance::problems {
@@ -203,6 +206,39 @@ TriMesh FillUpright(const SubjectData& data, const Experiment& e, const RunConte
   return Rotated(FillSkull(Rotated(data.skull, upright), e.fill, context), upright.transpose());
 }
 
+std::string SchemeName(const DepthScheme& scheme) {
+  return std::visit(
+      []<class Scheme>(const Scheme& options) {
+        if constexpr (std::is_same_v<Scheme, ExternalScheme>) {
+          return options.name;
+        } else {
+          return std::string(Scheme::kName);
+        }
+      },
+      scheme);
+}
+
+// Refuses a field without a depth of the scheme: the rule `outside` would fill all of it, and its
+// depths would pass for the scheme's. Adds a note if a scheme that may leave vertices out did so.
+void CheckAssigned(const DepthScheme& scheme, DepthField& depth) {
+  const auto all = depth.status.size();
+  const auto assigned =
+      static_cast<std::size_t>(std::ranges::count(depth.status, DepthStatus::kAssigned));
+  if (assigned == 0) {
+    throw InputError(fmt::format(
+        "interp: {} gave no depth to any of the {} vertices of the skull, so that all depths would "
+        "be those of the rule `outside`; check that it belongs to this skull, and its result",
+        SchemeName(scheme), all));
+  }
+  if (assigned < all && (std::holds_alternative<ExternalScheme>(scheme) ||
+                         std::holds_alternative<DepthMap>(scheme))) {
+    depth.notes.push_back(fmt::format(
+        "interp: {} gave no depth to {} of the {} vertices of the skull; the rule `outside` gives "
+        "them theirs",
+        SchemeName(scheme), all - assigned, all));
+  }
+}
+
 DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& step,
                            const RunContext& context) {
   constexpr double kLeastDepth_mm = 1;  // of a dowel on the shell
@@ -234,8 +270,10 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
                    {},
                    !std::holds_alternative<NoFill>(e.fill)};
   stage.depth = step("interpolate depth", [&] {
-    return ApplyOutsideRule(e.outside, stage.Input(),
-                            InterpolateDepth(WayToDepth(e), stage.Input(), context), context);
+    const DepthScheme scheme = WayToDepth(e);
+    DepthField depth = InterpolateDepth(scheme, stage.Input(), context);
+    CheckAssigned(scheme, depth);
+    return ApplyOutsideRule(e.outside, stage.Input(), std::move(depth), context);
   });
   LimitDepths(e, stage.shell, stage.subject, stage.depth);
   stage.subject.notes.insert(stage.subject.notes.end(), stage.depth.notes.begin(),
