@@ -285,8 +285,10 @@ void DeclareExport(CLI::App& to, CommandLine& line) {
         ".stl; for a mesh with its values: .vtp .vtu .ply, with colours: .glb, shape alone: "
         ".obj .off .stl; for a run: .glb with skull, face and depth markers")
       ->required();
-  to.add_option("--chord_mm", a.chord_mm,
-                "largest distance of a triangle from the surface of an H-spline [0.1]")
+  to.add_option(
+        "--chord_mm", a.chord_mm,
+        "largest distance of a triangle from the surface of an H-spline [0.1, or 1/5000 of its "
+        "extent if that is more]")
       ->check(Finite());
   AddThreads(to, a.threads);
   AddForce(to, a);

@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <iterator>
 #include <set>
@@ -89,6 +90,15 @@ std::vector<VertexScalar> CurvatureScalars(const HSplineSurface& surface,
           {"scalar_gaussian_curvature_per_mm2", gaussian}};
 }
 
+// 0.1 mm, or 1/5000 of the extent if that is more: a map in metres gets as many triangles as a
+// head, which is 0.5 m large.
+double DefaultChord(const HSplineSurface& surface) {
+  constexpr double kChord_mm = 0.1, kShare = 1.0 / 5000;
+  constexpr int kPerPatch = 2;  // the extent need not be exact
+  return std::max(kChord_mm,
+                  kShare * Bounds(Tessellate(surface, kPerPatch).mesh).diagonal().norm());
+}
+
 std::string TriangleBytes(const HSplineSurface& surface, const std::string& extension,
                           double chord_mm, int threads) {
   Tessellation tessellation = TessellateToChord(surface, chord_mm, threads);
@@ -127,8 +137,7 @@ std::string EncodeFace(const HSplineSurface& surface, const std::string& given,
         ".igs .glb .vtp .ply .obj .off or .stl",
         given));
   }
-  constexpr double kChord_mm = 0.1;
-  return TriangleBytes(surface, extension, chord_mm.value_or(kChord_mm), threads);
+  return TriangleBytes(surface, extension, chord_mm.value_or(DefaultChord(surface)), threads);
 }
 
 std::string SurfaceToVtu(const HSplineSurface& surface) {

@@ -13,8 +13,8 @@ namespace semblance::surfaces {
 //   Exact, in mm: .vtu (bicubic patches); .step .stp and .iges .igs (B-spline surfaces).
 //   Triangles within a chord error: .glb (metres); .vtp .ply .obj .off .stl (mm). A .vtp and a .ply
 //   also have normals and the mean and Gaussian curvature per vertex.
-// chord_mm: for triangles only, default 0.1. Throws InputError for another ending, or a chord error
-// with an exact format.
+// chord_mm: for triangles only; by default 0.1, or 1/5000 of the extent if that is more. Throws
+// InputError for another ending, or a chord error with an exact format.
 std::string EncodeFace(const HSplineSurface& surface, const std::string& extension,
                        std::optional<double> chord_mm = {}, int threads = 1);
 
