@@ -67,15 +67,6 @@ int PrintPlan(const StudyPlan& plan, const std::string& only) {
   return kDone;
 }
 
-// Prints a complaint and returns false if no trial has the metric.
-bool CheckMetric(const StudyResults& results) {
-  const bool has = results.HasMetric() || results.Count("done") == 0;
-  if (!has) {
-    Tell("no trial has the number '{}'; trials.csv lists all numbers\n", results.metric);
-  }
-  return has;
-}
-
 void PrintVersions(const StudyResults& results) {
   for (const std::string& note : VersionNotes(results)) {
     Tell("note: {}\n", note);
@@ -130,7 +121,6 @@ int PrintStudyState(const StudyResults& results, const fs::path& root, std::size
   } else {
     Tell("no report yet; semblance merge {} makes one of the finished trials\n", root.string());
   }
-  CheckMetric(results);
   return FindExitCode(results);
 }
 
@@ -151,7 +141,10 @@ int PrintPartState(const StudyResults& results, const std::vector<bool>& selecte
   Tell("{} of the {} selected trials done; {} of all {} trials of the study are missing\n", done,
        count, results.Count("missing"), results.trials.size());
   Tell("report: {}\n", fs::absolute(root / "report.html").lexically_normal().string());
-  return CheckMetric(results) && done == count ? kDone : kNotUsable;
+  if (const std::string without = MissingMetricText(results); !without.empty()) {
+    Tell("{}\n", without);
+  }
+  return (results.HasMetric() || results.Count("done") == 0) && done == count ? kDone : kNotUsable;
 }
 
 // Shows a study in the browser as long as it lives.

@@ -507,8 +507,11 @@ bool IsChanged(const StoredPlan& stored, const StudyPlan& plan, const fs::path& 
   if (changed && CountLeftOver(stored, plan) == static_cast<int>(stored.ids.size())) {
     throw IoError(fmt::format(
         "{}: the folder holds another study (plan {}, this is {}), and the two share no "
-        "trial, because options or contents of input files differ; choose another --out",
-        folder.string(), stored.hash, plan.hash));
+        "trial, because options or contents of input files{} differ; choose another --out",
+        folder.string(), stored.hash, plan.hash,
+        plan.own_metrics.empty()
+            ? ""
+            : ", or the source file of a metric (which counts in every trial)"));
   }
   return changed;
 }

@@ -244,6 +244,30 @@ std::vector<std::string> VersionNotes(const StudyResults& results) {
   return notes;
 }
 
+std::string MissingMetricText(const StudyResults& results) {
+  constexpr std::size_t kNamed = 5;
+  if (!results.HasMetric()) {
+    return results.Count("done") == 0
+               ? ""
+               : fmt::format("no trial has the number '{}'; trials.csv lists all numbers",
+                             results.metric);
+  }
+  std::vector<std::string> named;
+  std::size_t count = 0;
+  for (const TrialRow& row : results.trials) {
+    if (row.status == "done" && !row.metrics.contains(results.metric) && ++count <= kNamed) {
+      named.push_back(fmt::format("{} {}", row.subject, fmt::join(row.values, " | ")));
+    }
+  }
+  return count == 0 ? ""
+                    : fmt::format(
+                          "{} of {} trials that are done {} no finite number '{}' and "
+                          "{} not count: {}{}",
+                          count, results.Count("done"), count == 1 ? "has" : "have", results.metric,
+                          count == 1 ? "does" : "do", fmt::join(named, "; "),
+                          count > kNamed ? "; ..." : "");
+}
+
 std::string DamageText(const StudyResults& results) {
   constexpr std::size_t kNamed = 5;
   std::vector<std::string> named;

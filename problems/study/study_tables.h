@@ -67,6 +67,10 @@ StudyResults ReadStudyResults(const std::filesystem::path& folder,
 // made by version 0.0.1 ...". Such numbers may differ for another reason than the treatments.
 std::vector<std::string> VersionNotes(const StudyResults& results);
 
+// Returns a line on trials that are done but have no finite number for the metric, so that they do
+// not count in the ranking; empty if there is none.
+std::string MissingMetricText(const StudyResults& results);
+
 // Returns a line that names the damaged trials; empty if there is none.
 std::string DamageText(const StudyResults& results);
 

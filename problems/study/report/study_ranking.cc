@@ -178,8 +178,10 @@ std::string RankingText(const StudyResults& results) {
   const std::vector<Treatment> all = RankTreatments(results);
   std::vector<Treatment> ranked = RestrictToCommonSubjects(results, all);
   std::erase_if(ranked, [](const Treatment& t) { return t.by_subject.empty(); });
+  const std::string missing = MissingMetricText(results);
+  const std::string last = missing.empty() ? "" : missing + "\n";
   if (ranked.empty()) {
-    return {};
+    return last;
   }
   std::string text = fmt::format("{}, {}{}:\n", WordsOfMetric(results.metric),
                                  RankingOrderText(results.preference), LabelPartsText(results));
@@ -196,7 +198,7 @@ std::string RankingText(const StudyResults& results) {
     text += fmt::format("      and {} more in summary.csv\n", ranked.size() - kLines);
   }
   const std::string common = CommonSubjectsText(all);
-  return text + (common.empty() ? "" : common + "\n");
+  return text + (common.empty() ? "" : common + "\n") + last;
 }
 
 }  // namespace semblance::problems

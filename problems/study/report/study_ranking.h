@@ -39,8 +39,8 @@ std::string RankingOrderText(const Preference& preference);
 std::string LabelPartsText(const StudyResults& results);
 
 // One line per treatment for a terminal: rank, mean over the common subjects, their number, seconds
-// and label. Lists the first twenty and counts the others. Ends with CommonSubjectsText. Empty if
-// no trial has a value.
+// and label. Lists the first twenty and counts the others. Ends with CommonSubjectsText and
+// MissingMetricText. Without a value it has the latter alone.
 std::string RankingText(const StudyResults& results);
 
 }  // namespace semblance::problems

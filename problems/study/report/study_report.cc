@@ -442,6 +442,9 @@ std::vector<std::string> StudyNotes(const StudyResults& results,
   if (const std::string unusable = UnusableText(results); !unusable.empty()) {
     notes.push_back(unusable + ".");
   }
+  if (const std::string without = MissingMetricText(results); !without.empty()) {
+    notes.push_back(without + ".");
+  }
   if (const std::string damaged = DamageText(results); !damaged.empty()) {
     notes.push_back(damaged + ".");
   }

@@ -59,7 +59,7 @@ TEST(StudyRanking, TheBestMeanComesFirst) {
   EXPECT_THAT(text, HasSubstr("   4           5  2 subjects, 4.0 s  a, 10\n"));
   StudyResults none = Results();
   none.metric = "another";
-  EXPECT_EQ(RankingText(none), "");
+  EXPECT_EQ(RankingText(none), "no trial has the number 'another'; trials.csv lists all numbers\n");
 }
 
 // An unusable trial has the best value by far. No number changes because of it, and all tables
