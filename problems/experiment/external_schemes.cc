@@ -5,11 +5,13 @@
 
 #include <algorithm>
 #include <cctype>
+#include <iterator>
 #include <optional>
 #include <set>
 #include <utility>
 
 #include "problems/config/config.h"
+#include "problems/config/spelling_suggestion.h"
 #include "surfaces/base/error.h"
 
 namespace semblance::problems {
@@ -143,11 +145,36 @@ std::optional<ExternalScheme> ReadExternalScheme(const ConfigNode& interp,
   return result;
 }
 
+namespace {
+
+// The reader of configurations lists the built-in schemes alone. Where there are schemes of one's
+// own, returns the complaint about a name that is neither, with all names; else "".
+std::string UnknownSchemeText(const ConfigNode& interp, std::span<const NamedScheme> schemes) {
+  const DepthChoice* const built_in = nullptr;
+  const std::string name = SchemeName(interp);
+  std::vector<std::string> known = config_internal::TypeNames(built_in);
+  if (schemes.empty() || name.empty() || std::ranges::find(known, name) != known.end()) {
+    return "";
+  }
+  std::ranges::transform(schemes, std::back_inserter(known), &NamedScheme::name);
+  const std::string nearest = NearestWord(name, known);
+  return fmt::format("unknown scheme '{}'; known are: {}{}", name, fmt::join(known, ", "),
+                     nearest.empty() ? "" : fmt::format("; did you mean '{}'?", nearest));
+}
+
+}  // namespace
+
 Experiment ReadExperimentTree(ConfigNode tree, std::span<const NamedScheme> schemes,
                               ConfigErrors& errors) {
   ConfigNode* const interp = tree.Find("interp");
   const std::optional<ExternalScheme> scheme =
       interp == nullptr ? std::nullopt : ReadExternalScheme(*interp, schemes, errors);
+  const std::string unknown =
+      interp == nullptr || scheme ? "" : UnknownSchemeText(*interp, schemes);
+  if (!unknown.empty()) {
+    errors.Add(interp->location, "interp", unknown);
+    *interp = ConfigNode::Scalar(std::string(Nearest::kName));
+  }
   if (!scheme) {
     return ReadConfigTree<Experiment>(tree, errors);
   }

@@ -115,7 +115,7 @@ py::dict RunConfig(const std::string& config, const std::vector<std::string>& ov
   const Experiment experiment = ReadExperiment(config, overrides, named);
   auto result = Interruptible([&](const std::stop_token& stop) {
     RunContext context;
-    context.threads = threads;
+    context.threads = RequireAtLeastOne(threads, "threads");
     context.stop_token = stop;
     std::optional<StagedFolder> folder;
     if (out) {
@@ -165,7 +165,7 @@ void CheckStudyFolder(const std::string& path) {
 }
 
 // Runs a study or a shard of it. Writes the tables unless it is a shard. Returns the counts of
-// StudySummary, and the ranking as text.
+// StudySummary, the ranking as text, and a line per failed trial of the folder.
 py::dict RunStudyFile(const std::string& path, const std::string& out, int jobs,
                       std::pair<int, int> shard, const std::string& only,
                       const py::iterable& schemes, const py::iterable& metrics,
@@ -174,20 +174,28 @@ py::dict RunStudyFile(const std::string& path, const std::string& out, int jobs,
       path, WithoutSubjects::kFault,
       {.schemes = ReadSchemes(schemes), .metrics = ReadMetrics(metrics), .are_files_loaded = true});
   StudyRunOptions options;
-  options.jobs = jobs;
+  options.jobs = RequireAtLeastOne(jobs, "jobs");
   options.shard = shard.first;
   options.shards = shard.second;
   options.only = only;
   options.cache = cache;
   options.rerun = ParseRerun(rerun);
   std::string ranking;
+  std::vector<std::string> failures;
   const StudySummary summary = Interruptible([&](const std::stop_token& stop) {
     RunContext context;
     context.stop_token = stop;
     StudySummary done = RunStudy(plan, out, options, context);
     if (options.shards == 1) {
       OutputFolder folder(out, WhenNotEmpty::kReplaceFiles);
-      ranking = RankingText(WriteStudyTables(folder));
+      const StudyResults results = WriteStudyTables(folder);
+      ranking = RankingText(results);
+      for (const TrialRow& row : results.trials) {
+        if (row.status == "failed") {
+          failures.push_back(fmt::format("{} {} | {}: {}", row.id, row.subject,
+                                         fmt::join(row.values, " | "), row.reason));
+        }
+      }
     }
     return done;
   });
@@ -197,6 +205,7 @@ py::dict RunStudyFile(const std::string& path, const std::string& out, int jobs,
   counts["done"] = summary.done;
   counts["failed"] = summary.failed;
   counts["ranking"] = ranking;
+  counts["failures"] = failures;
   return counts;
 }
 

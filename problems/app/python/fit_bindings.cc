@@ -203,7 +203,7 @@ py::dict FitArrays(const py::dict& given, const std::string& options, int thread
   }
   const PointFit fit = Interruptible([&](const std::stop_token& stop) {
     RunContext context;
-    context.threads = threads;
+    context.threads = RequireAtLeastOne(threads, "threads");
     context.stop_token = stop;
     return FitPoints(std::move(table), chosen, context);
   });
@@ -217,7 +217,7 @@ py::dict PredictHeights(const HSplineSurface& surface, const py::dict& evidence,
   PredictedHeights heights;
   {
     const py::gil_scoped_release release;
-    heights = predictor.At(places, level, threads);
+    heights = predictor.At(places, level, RequireAtLeastOne(threads, "threads"));
   }
   py::array_t<bool> supported(static_cast<py::ssize_t>(heights.supported.size()));
   std::ranges::transform(heights.supported, supported.mutable_data(),

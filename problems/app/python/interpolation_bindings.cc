@@ -75,7 +75,7 @@ py::tuple Interpolate(const Doubles& vertices, const Indices& triangles, const D
   const DowelNetwork network = MakeNetwork(areas, dowels.size());
   const DepthScheme scheme = ReadScheme(scheme_text, ReadSchemes(schemes));
   RunContext context;
-  context.threads = threads;
+  context.threads = RequireAtLeastOne(threads, "threads");
   DepthField field;
   {
     const py::gil_scoped_release release;

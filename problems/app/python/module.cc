@@ -32,6 +32,8 @@ void BindErrors() {
       Raise("InputError", error.what());
     } catch (const IoError& error) {
       Raise("IoError", error.what());
+    } catch (const OutOfMemory& error) {
+      PyErr_SetString(PyExc_MemoryError, error.what());
     } catch (const ExternalFailure& failure) {
       Raise("PluginError", std::string(failure.what()) + "\n\n" + failure.traceback());
     }

@@ -56,7 +56,7 @@ Doubles PointsAt(const HSplineSurface& surface, const Doubles& uv, int threads) 
   std::vector<Vec3> points;
   {
     const py::gil_scoped_release release;
-    points = HSplineBatch(surface).Points(at, threads);
+    points = HSplineBatch(surface).Points(at, RequireAtLeastOne(threads, "threads"));
   }
   return MakeArray(points);
 }
@@ -66,7 +66,7 @@ Doubles NormalsAt(const HSplineSurface& surface, const Doubles& uv, int threads)
   SurfaceSamples samples;
   {
     const py::gil_scoped_release release;
-    samples = HSplineBatch(surface).PointsAndNormals(at, threads);
+    samples = HSplineBatch(surface).PointsAndNormals(at, RequireAtLeastOne(threads, "threads"));
   }
   return MakeArray(samples.normals);
 }

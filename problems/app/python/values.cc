@@ -102,6 +102,13 @@ std::vector<Triangle> ReadTriangles(const Indices& triangles, std::string_view n
   return rows;
 }
 
+int RequireAtLeastOne(int number, std::string_view name) {
+  if (number < 1) {
+    throw InputError(fmt::format("{} is {}; it must be at least 1", name, number));
+  }
+  return number;
+}
+
 TriMesh MakeMesh(const Doubles& vertices, const Indices& triangles) {
   TriMesh mesh{.points = Points3(vertices, "vertices"), .triangles = {}};
   mesh.triangles = ReadTriangles(triangles, "triangles", mesh.points.size());

@@ -31,6 +31,9 @@ std::vector<Vec2> Points2(const Doubles& array, std::string_view name);
 std::span<const double> Numbers(const Doubles& array, std::string_view name,
                                 MissingNumbers missing = MissingNumbers::kRefuse);
 
+// Returns the number of threads or jobs; throws InputError if it is below 1.
+int RequireAtLeastOne(int number, std::string_view name);
+
 // vertices: n x 3. triangles: m x 3 indices from 0. Throws InputError for an index without vertex.
 TriMesh MakeMesh(const Doubles& vertices, const Indices& triangles);
 // m x 3 indices from 0, each below `count`. `name`: name of the array in messages.

@@ -26,14 +26,17 @@ def main(arguments=None):
     study.add_argument("--jobs", type=int, default=1, help="trials at a time")
     study.add_argument("--shard", type=shard, default=(0, 1), metavar="I/N", help="only every N-th trial, starting with trial I (from 0); `semblance merge` collects")
     study.add_argument("--only", default="", help="condition for the trials to run")
+    study.add_argument("--rerun", default="", metavar="WHICH", help="run finished trials again: failed, unusable, other-versions or all")
     given = parser.parse_args(arguments)
     out = pathlib.Path("out", pathlib.Path(given.config).stem) if given.out is None else given.out
     try:
-        counts = run_study(given.config, out, given.jobs, given.shard, given.only, (), ())
+        counts = run_study(given.config, out, given.jobs, given.shard, given.only, (), (), rerun=given.rerun)
     except (InputError, IoError) as error:
         print(f"semblance: {error}", file=sys.stderr)
         return BAD_INPUT
     print(counts["ranking"], end="")
+    for line in counts["failures"]:
+        print("failed:", line)
     print("{trials} trials, {skipped} existed, {done} done, {failed} failed".format(**counts))
     return 1 if counts["failed"] else 0
 

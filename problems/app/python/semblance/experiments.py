@@ -7,6 +7,7 @@ import pathlib
 import warnings
 
 from . import _semblance
+from .arrays import refuse_masked
 from .errors import InputError, IoError
 from .options import option_text
 from .plugins import Metric, Scheme, load_plugins
@@ -26,7 +27,7 @@ def interpolate(vertices, triangles, bases, directions, depths_mm, scheme="krigi
         Their depths.
     scheme : str, dict or Scheme
         Name of a scheme; a dictionary with `type` and its options, like `interp` in a configuration; or one of your
-        own, which `semblance.scheme` made.
+        own, which `semblance.scheme` made, also as the `type` of a dictionary.
     areas : array of shape (a, 3), optional
         The dowel network: indices of three depth markers each, for schemes that need one.
 
@@ -35,8 +36,11 @@ def interpolate(vertices, triangles, bases, directions, depths_mm, scheme="krigi
     depth_mm, sd_mm : arrays of n numbers
         NaN where the scheme gives none.
     """
-    own = [scheme] if isinstance(scheme, Scheme) else []
-    text = option_text(scheme.name if own else scheme)
+    scheme = {"type": scheme} if isinstance(scheme, Scheme) else scheme
+    own = [scheme["type"]] if isinstance(scheme, dict) and isinstance(scheme.get("type"), Scheme) else []
+    text = option_text({**scheme, "type": own[0].name} if own else scheme)
+    for name, values in (("vertices", vertices), ("bases", bases), ("directions", directions), ("depths_mm", depths_mm)):
+        refuse_masked(values, name)
     return _semblance.interpolate(vertices, triangles, bases, directions, depths_mm, text, own, areas, threads)
 
 

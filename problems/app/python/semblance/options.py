@@ -4,6 +4,8 @@ import json
 import os
 import re
 
+import numpy as np
+
 from .errors import InputError
 
 # YAML reads these plain words as other values than texts.
@@ -14,9 +16,9 @@ def option_text(value):
     """Write numbers, texts, booleans, None, lists and dictionaries as YAML on one line."""
     if value is None:
         return "null"
-    if isinstance(value, bool):
+    if isinstance(value, (bool, np.bool_)):
         return "true" if value else "false"
-    if isinstance(value, float):
+    if isinstance(value, (float, np.floating)):
         return repr(float(value))
     if hasattr(value, "__index__"):
         return str(int(value))

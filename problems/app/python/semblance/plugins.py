@@ -56,6 +56,10 @@ class Scheme:
         self.source_hash = _source_hash(function)
         self.__doc__ = function.__doc__
         self.__wrapped__ = function  # for inspect.signature
+        self.__module__ = function.__module__
+
+    def __reduce__(self):
+        return _pickled_name(self)
 
     def __call__(self, given: DepthInput, **options):
         return self.function(given, **{**self.options, **options})
@@ -82,6 +86,10 @@ class Metric:
         self.source_hash = _source_hash(function)
         self.__doc__ = function.__doc__
         self.__wrapped__ = function
+        self.__module__ = function.__module__
+
+    def __reduce__(self):
+        return _pickled_name(self)
 
     def __call__(self, result: Result):
         return self.function(result)
@@ -114,8 +122,9 @@ def scheme(name: str, *, needs_surface: bool = False, needs_network: bool = Fals
 
     Notes
     -----
-    A trial of a study has the hash of the scheme's source file in its id, so a changed file makes its trials anew.
-    Keep schemes in a file of their own. Several threads of a study take turns at calling Python.
+    The id of a trial has the hashes of the source files of its scheme and of all metrics, so a changed file makes
+    its trials anew. Keep each scheme in a file of its own, and metrics in another. Several threads of a study take
+    turns at calling Python.
 
     Examples
     --------
@@ -125,7 +134,14 @@ def scheme(name: str, *, needs_surface: bool = False, needs_network: bool = Fals
     ...     weight = np.maximum(distance, 1e-9) ** -power
     ...     return weight @ given.depths_mm / weight.sum(axis=1)
     """
-    return lambda function: Scheme(name, function, options, needs_surface, needs_network)
+    def decorate(function):
+        try:
+            inspect.signature(function).bind(None, **options)
+        except TypeError as error:
+            raise InputError(f"scheme '{name}': its function cannot be called with its options {list(options)}: {error}") from None
+        return Scheme(name, function, options, needs_surface, needs_network)
+
+    return decorate
 
 
 def metric(name: str):
@@ -158,6 +174,11 @@ def load_plugins(path):
     spec.loader.exec_module(module)
     values = vars(module).values()
     return ([value for value in values if isinstance(value, Scheme)], [value for value in values if isinstance(value, Metric)])
+
+
+def _pickled_name(part):
+    """The name under which pickle finds a scheme or metric of a module."""
+    return part.function.__qualname__
 
 
 def _source_hash(function):

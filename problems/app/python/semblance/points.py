@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from . import _semblance
+from .arrays import floats
 from .errors import InputError
 from .options import option_text
 from .surface import HSpline
@@ -110,7 +111,7 @@ def fit(points, uv=None, weights=None, threads: int = 1, *, sigma_of_points=None
     Parameters
     ----------
     points : array of shape (n, 3)
-        In mm. A row that is not finite is an error.
+        In mm. A row that is not finite, or masked, is an error.
     uv : array of shape (n, 2), optional
         Their (u, v); without it the option `parameters` decides.
     weights, sigma_of_points : arrays of n numbers above 0, optional
@@ -142,17 +143,15 @@ def fit(points, uv=None, weights=None, threads: int = 1, *, sigma_of_points=None
     if exact is not None:
         exact = np.asarray(exact)
         exact = np.flatnonzero(exact) if exact.dtype == bool else exact.astype("int64")
-    given = {"points": _floats(points), "uv": _floats(uv), "weights": _floats(weights), "sigma": _floats(sigma_of_points), "triangles": triangles,
-             "exact": exact, "exact_normals": _floats(exact_normals), "attributes": {name: _floats(values) for name, values in (attributes or {}).items()}}
+    given = {"points": floats(points, "points"), "uv": floats(uv, "uv"), "weights": floats(weights, "weights"),
+             "sigma": floats(sigma_of_points, "sigma_of_points"), "triangles": triangles, "exact": exact,
+             "exact_normals": floats(exact_normals, "exact_normals"),
+             "attributes": {name: floats(values, name) for name, values in (attributes or {}).items()}}
     parts = _semblance.fit(given, option_text(options), threads)
     values = dict(zip(parts.pop("attribute_names"), parts.pop("attribute_values")))
     return PointFit(surface=HSpline._of(parts.pop("surface")), outliers=np.array(parts.pop("outliers"), int), attributes=values,
                     _attribute_surfaces=[HSpline._of(surface) for surface in parts.pop("attribute_surfaces")],
                     _evidence=parts.pop("evidence"), **parts)
-
-
-def _floats(values):
-    return None if values is None else np.asarray(values, float)
 
 
 def fit_options() -> str:
@@ -183,13 +182,17 @@ def rows_term(uv, equals, du=0, dv=0, coefficients=None, weight: float = 1.0) ->
     >>> flat = rows_term([[0.0, v] for v in (0.2, 0.5, 0.8)], np.zeros((3, 3)), du=2)
     >>> fit(points, uv, fit={"plan": "adaptive", "terms": ["points", flat]})
     """
-    uv = np.asarray(uv, float)
+    uv = floats(uv, "uv")
     uv = uv[:, None] if uv.ndim == 2 else uv
-    equals = np.asarray(equals, float)
+    equals = floats(equals, "equals")
     if uv.ndim != 3 or uv.shape[2] != 2 or equals.shape != (len(uv), 3):
         raise InputError(f"uv has the shape {uv.shape} and equals {equals.shape}; expected n x m x 2 and n x 3")
-    ones = np.ones(uv.shape[:2])
-    entries = np.concatenate([uv, np.stack([ones * du, ones * dv, ones * (1 if coefficients is None else np.asarray(coefficients, float))], -1)], axis=2)
+    columns = []
+    for name, values in (("du", du), ("dv", dv), ("coefficients", 1 if coefficients is None else coefficients)):
+        if np.shape(values) not in ((), uv.shape[:2]):
+            raise InputError(f"{name} has the shape {np.shape(values)}; expected one number or {uv.shape[:2]}, one per place")
+        columns.append(np.broadcast_to(floats(values, name), uv.shape[:2]))
+    entries = np.concatenate([uv, np.stack(columns, -1)], axis=2)
     for name, array in (("uv or coefficients", entries), ("equals", equals)):
         if not np.isfinite(array).all():
             raise InputError(f"{name}: row {np.argwhere(~np.isfinite(array))[0][0]} is not finite")

@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 
+from .arrays import refuse_masked
 from .points import fit
 
 try:
@@ -74,6 +75,8 @@ class SurfaceRegressor(*(_plain_base() if BaseEstimator is None else (RegressorM
 
         Faults and notes of the fit become warnings.
         """
+        for values, name in ((X, "X"), (y, "y"), (sample_weight, "sample_weight")):
+            refuse_masked(values, name)
         X, y = self._check_table(X, y)
         weights = None if sample_weight is None else np.asarray(sample_weight, float)
         if weights is not None and weights.shape != y.shape:

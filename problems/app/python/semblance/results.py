@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The result of a run, or of one trial of a study."""
+import difflib
 import html
 import json
 
@@ -43,15 +44,25 @@ class Result:
             setattr(self, name, arrays[name])
         self._page = page  # makes the page with the 3-D view; not pickled
 
-    def __getitem__(self, name):
-        """`result` for `numbers`, `surface` and `faults`, as the file formats name them."""
-        names = {"result": "numbers", "surface": "surface", "faults": "faults"}
-        if name not in names:
-            raise KeyError(f"{name}; there are result, surface and faults, and the attributes of Result")
-        return getattr(self, names[name])
+    @property
+    def usable(self) -> bool:
+        """Whether the result can be used: it has no faults."""
+        return not self.faults
+
+    def __getitem__(self, path: str):
+        """Return a number of result.json by its dotted path, e.g. ``result["face.rms_mm"]``. KeyError if it is missing."""
+        value, known = self.numbers, []
+        for part in path.split("."):
+            known = list(value) if isinstance(value, dict) else []
+            if part not in known:
+                near = difflib.get_close_matches(part, known, 1)
+                hint = f"did you mean '{near[0]}'?" if near else f"there are {', '.join(known)}" if known else "there is nothing below it"
+                raise KeyError(f"{path}: no '{part}'; {hint}")
+            value = value[part]
+        return value
 
     def number(self, path: str):
-        """Return a number of result.json by its dotted path, e.g. "face.rms_mm"; None if it is missing or misspelt."""
+        """Return the same as ``result[path]``, but None if the result lacks it, such as ``face`` without a true skin."""
         value = self.numbers
         for part in path.split("."):
             value = value.get(part) if isinstance(value, dict) else None

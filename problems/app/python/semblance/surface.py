@@ -49,7 +49,7 @@ class HSpline:
             .hspline.json keeps everything. .step, .iges and .vtu are exact. .ply, .glb, .vtp, .obj, .off
             and .stl are triangles.
         chord_mm : float, optional
-            Largest distance of the triangles from the surface; default 0.1 mm.
+            Largest distance of the triangles from the surface; default 0.1 mm, or 1/5000 of the extent if that is more.
         """
         self._surface.write(os.fspath(path), chord_mm, threads)
 

@@ -235,6 +235,14 @@ class Fit(unittest.TestCase):
             semblance.fit(paraboloid(9), weights=np.ones(81), sigma_of_points=np.ones(81))
         with self.assertRaises(TypeError):
             semblance.fit(paraboloid(9), patches_w=3)
+        masked = np.ma.masked_greater(paraboloid(9), 30)
+        masked[5, 2] = np.ma.masked
+        with self.assertRaisesRegex(semblance.InputError, "points: [0-9]+ rows are masked, the first is row"):
+            semblance.fit(masked)
+        with self.assertRaisesRegex(semblance.InputError, "points: Complex data not supported"):
+            semblance.fit(paraboloid(9) + 1j)
+        with self.assertRaisesRegex(semblance.InputError, "threads is 0"):
+            semblance.fit(paraboloid(9), threads=0)
 
     def test_unknown_options_are_reported_with_a_suggestion(self):
         with self.assertRaisesRegex(semblance.ConfigError, "patches_w.*did you mean 'patches_[uv]'"):
@@ -299,9 +307,13 @@ class Experiments(unittest.TestCase):
             written = semblance.HSpline.read(os.path.join(out, "face.hspline.json"))
             with self.assertRaises(semblance.IoError):
                 semblance.run(config, set=self.QUICK, out=out)  # no file is replaced without force
-        self.assertTrue((run["surface"].net(0) == written.net(0)).all())
-        self.assertGreater(run["result"]["face"]["rms_mm"], 0)
-        self.assertEqual(run.number("face.rms_mm"), run["result"]["face"]["rms_mm"])
+        self.assertTrue((run.surface.net(0) == written.net(0)).all())
+        self.assertTrue(run.usable)
+        self.assertGreater(run["face.rms_mm"], 0)
+        self.assertEqual(run.number("face.rms_mm"), run.numbers["face"]["rms_mm"])
+        self.assertIsNone(run.number("face.rmss_mm"))
+        with self.assertRaisesRegex(KeyError, "did you mean 'rms_mm'"):
+            run["face.rmss_mm"]
         np.testing.assert_array_equal(run.face[0], run.surface.mesh(4)[0])
         self.assertEqual(len(run.depth_mm), len(run.skull[0]))
         self.assertEqual(len(run.region), len(run.truth[0]))

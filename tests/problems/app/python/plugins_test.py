@@ -3,9 +3,11 @@
 import contextlib
 import inspect
 import io
+import copy
 import json
 import os
 import pathlib
+import pickle
 import sys
 import tempfile
 import unittest
@@ -91,6 +93,39 @@ class Study(unittest.TestCase):
         self.assertEqual(reason, "level: RuntimeError: no depth today")
         self.assertIn("mine.py", (self.root / "out" / "trials" / trial / "traceback.txt").read_text())
 
+    def test_a_scheme_without_a_single_depth_fails_and_one_with_some_is_noted(self):
+        nothing = semblance.scheme("nothing")(lambda given: np.full(len(given.vertices), np.nan))
+        near = semblance.scheme("near")(lambda given: np.where(given.vertices[:, 2] > 0, 5.0, np.nan))
+        with self.assertWarnsRegex(UserWarning, "1 of 2 trials failed"):
+            table = semblance.study(self.study("nothing, mean"), self.root / "out", schemes=[nothing], wide=True)
+        rows = table if isinstance(table, list) else table.to_dict("records")
+        self.assertEqual({row["interp"]: row["status"] for row in rows}, {"nothing": "failed", "mean": "done"})
+        with self.assertRaisesRegex(semblance.InputError, "nothing gave no depth to any of the"):
+            semblance.run(PHANTOM, set={"interp": "nothing", "subject.rings": 24, "implicit.resolution": 16}, schemes=[nothing])
+        found = semblance.run(PHANTOM, set={"interp": "near", "subject.rings": 24, "implicit.resolution": 16}, schemes=[near])
+        self.assertEqual(len([note for note in found.notes if "near gave no depth to" in note]), 1)
+
+    def test_trials_without_a_finite_metric_are_named(self):
+        study = self.write(f"base: {PHANTOM}\njob: depth\nset: {{subject.rings: 24}}\ngrid: {{interp: [mean, nearest]}}\nmetric: odd\nplugins: [mine.py]\n")
+        for value, words in (("np.nan", "no trial has the number 'odd'"), ("np.nan if np.ptp(result.depth_mm) == 0 else 1.0", "1 of 2 trials that are done has no finite number 'odd'")):
+            self.write(f"import numpy as np, semblance\n@semblance.metric('odd')\ndef odd(result):\n    return {value}\n", "mine.py")
+            with contextlib.redirect_stdout(io.StringIO()) as told:
+                main(["study", study, "--out", str(self.root / str(len(words)))])
+            self.assertIn(words, told.getvalue())
+
+    def test_the_command_states_why_trials_failed_and_runs_them_again(self):
+        self.write(PLUGIN, "mine.py")
+        study = self.study("{type: level, fail: true}, mean", "plugins: [mine.py]\n")
+        for more, counts in (([], "0 existed, 1 done, 1 failed"), (["--rerun", "all"], "0 existed, 1 done, 1 failed")):
+            with contextlib.redirect_stdout(io.StringIO()) as told:
+                self.assertEqual(main(["study", study, "--out", str(self.root / "out"), *more]), 1)
+            self.assertIn("level fail=true: level: RuntimeError: no depth today", told.getvalue())
+            self.assertIn(counts, told.getvalue())
+
+    def test_schemes_and_metrics_of_a_module_are_copied_and_pickled_by_name(self):
+        self.assertIs(pickle.loads(pickle.dumps(shepard)), shepard)
+        self.assertIs(copy.deepcopy(shepard), shepard)
+
     def test_the_command_loads_plugins_and_another_source_makes_other_trials(self):
         study = self.study("level", "plugins: [mine.py]\n")
         printed = []
@@ -120,12 +155,23 @@ class Study(unittest.TestCase):
             with self.assertRaisesRegex((semblance.InputError, semblance.PluginError), words):
                 semblance.interpolate(vertices, [[0, 1, 2]], vertices[:1], [[0, 0, 1]], [5], own)
 
+    def test_an_own_scheme_takes_options_in_interpolate(self):
+        vertices, bases = np.array([[0, 0, 0], [10, 0, 0], [0, 10, 0.0]]), np.array([[1.0, 0, 0], [9, 0, 0]])
+        for given, power in (({"type": shepard, "power": 1}, 1), (shepard, 3)):
+            depth, _ = semblance.interpolate(vertices, [[0, 1, 2]], bases, [[0, 0, 1]] * 2, [5, 7], given)
+            weights = np.linalg.norm(vertices[:, None] - bases, axis=2) ** -power
+            np.testing.assert_allclose(depth, weights @ [5, 7] / weights.sum(axis=1), rtol=1e-12)
+
     def test_names_and_options_are_checked(self):
         vertices = [[0, 0, 0], [10, 0, 0], [0, 10, 0.0]]
         with self.assertRaisesRegex(semblance.InputError, "'kriging'"):
             semblance.run(PHANTOM, schemes=[semblance.scheme("kriging")(lambda given: given)])
         with self.assertRaisesRegex(semblance.UnknownOptionError, "did you mean 'power'"):
             semblance.study(self.study("{type: shepard, powr: 4}"), self.root / "out", schemes=[shepard])
+        with self.assertRaisesRegex(semblance.ConfigError, "'shepart'.*kriging.*shepard; did you mean 'shepard'"):
+            semblance.study(self.study("shepart"), self.root / "out", schemes=[shepard])
+        with self.assertRaisesRegex(semblance.InputError, "'flat': its function cannot be called"):
+            semblance.scheme("flat", power=2)(lambda given: given)
         with self.assertRaisesRegex(semblance.InputError, "option 'list' is a list"):
             semblance.interpolate(vertices, [[0, 1, 2]], vertices[:1], [[0, 0, 1]], [5], semblance.scheme("a", list=[])(lambda given, list: 1))
         with self.assertRaisesRegex(semblance.InputError, "'power' is taken|metric 'depth'"):

@@ -39,6 +39,17 @@ class Regressor(unittest.TestCase):
         two = semblance.SurfaceRegressor().fit(places[:300], noisy[:300], sample_weight=np.ones(300)).predict(places)
         np.testing.assert_allclose(one, two, atol=1e-9)
 
+    def test_intervals_of_points_with_known_deviations_hold_their_share(self):
+        random = np.random.default_rng(8)
+        places, truth, _ = table(6000, 7)
+        deviation = np.where(places[:, 0] < 0, 0.02, 0.2)
+        heights = truth + random.normal(0, deviation)
+        regressor = semblance.SurfaceRegressor().fit(places[:4000], heights[:4000], sample_weight=deviation[:4000] ** -2)
+        low, high = regressor.predict_interval(places[4000:])
+        holds = (low < heights[4000:]) & (heights[4000:] < high)
+        for half in (places[4000:, 0] < 0, places[4000:, 0] > 0):
+            self.assertTrue(0.84 < holds[half].mean() < 0.96, holds[half].mean())
+
     def test_nothing_is_known_outside_the_points(self):
         places, _, noisy = table(400, 4)
         regressor = semblance.SurfaceRegressor().fit(places, noisy)
