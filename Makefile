@@ -80,7 +80,8 @@ heads: configure
 	@cmake --build --preset quick --target semblance
 	@/usr/bin/python3 -B docs/heads.py build-quick/problems/semblance $(HEADS) out/heads $(if $(ONLY),--only "$(ONLY)",--page docs/experiments/heads.md)
 
-# The everyday tests: all but those with the labels documents (commands and figures of the documents) and packaging.
+# The everyday tests: all but those with the labels documents (commands and figures of the documents), packaging, and thorough (pages in a
+# browser, a cluster, studies of accuracy). CI runs all.
 test: build
 	@ctest --preset $(PRESET) -j "$$(nproc)"
 

@@ -69,7 +69,7 @@ Worth WorthOf(const std::string& site_error, const std::string& relaxation, Stag
           SharpestCrease_deg(run.fit.surface, mesh, run.fit.uv)};
 }
 
-TEST(RelaxationWorth, ItUndoesWrongParametersWithoutACreaseAndWithoutItTheyStay) {
+TEST(RelaxationWorthThorough, ItUndoesWrongParametersWithoutACreaseAndWithoutItTheyStay) {
   StageCache cache(4);
   const Worth exact = WorthOf("0", "none", cache), wrong = WorthOf("0.05", "none", cache),
               relaxed = WorthOf("0.05", "tangent_distance", cache);

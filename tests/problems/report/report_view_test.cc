@@ -116,7 +116,7 @@ std::string Page() {
   return html + kPress;
 }
 
-class ReportViewTest : public ::testing::Test {
+class ReportViewThorough : public ::testing::Test {
  protected:
   void SetUp() override {
     if (ThreeScript().empty()) {
@@ -147,8 +147,8 @@ class ReportViewTest : public ::testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(ReportViewTest, RendersTogglesLinksAndSortsWithoutAFault) {
-  const nlohmann::json out = Outcome(Page(), "1400,1800");
+TEST_F(ReportViewThorough, RendersTogglesLinksAndSortsWithoutAFault) {
+  const nlohmann::json out = Outcome(Page(), "800,800");
   EXPECT_EQ(out["faults"], nlohmann::json::array());
   EXPECT_EQ(out["wheel"], nlohmann::json({false, true, false}));
   EXPECT_EQ(out["touch"], "pan-y");
@@ -193,7 +193,7 @@ addEventListener('load', () => setTimeout(() => {
 }, 4000));
 </script>)js";
 
-TEST_F(ReportViewTest, MarksFaultsInRedAtTheirPlaces) {
+TEST_F(ReportViewThorough, MarksFaultsInRedAtTheirPlaces) {
   const RunResult run = SmallRun(1, "plausibility.direction_deg=0.001");
   ASSERT_EQ(run.Faults().size(), 1u);
   Report report;
@@ -236,7 +236,7 @@ addEventListener('load', () => setTimeout(() => {
 }, 0));
 </script>)js";
 
-TEST_F(ReportViewTest, FitsAPhoneAndFindsWhatIsFolded) {
+TEST_F(ReportViewThorough, FitsAPhoneAndFindsWhatIsFolded) {
   Report report;
   report.title = "a_title_without_a_single_blank_in_it_that_goes_on_and_on_and_on_and_on_and_on";
   report.notes = {"a note"};
