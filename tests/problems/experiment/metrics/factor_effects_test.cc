@@ -148,6 +148,14 @@ TEST(FactorEffects, DrawnPIsNearTheCountOverAllOrders) {
 
 // With two levels each, the interaction is one difference of differences per subject, and its test
 // the count over all signs.
+// One subject shows no effect, however many orders its levels have: p = 1, at once.
+TEST(FactorEffects, ASingleSubjectHasNoTest) {
+  const GridValues grid = RandomGrid({40, 3}, 1, 3);
+  for (const std::vector<std::size_t>& factors : {std::vector<std::size_t>{0}, {1}, {0, 1}}) {
+    EXPECT_EQ(ComputeEffect(grid, factors).p, 1);
+  }
+}
+
 TEST(FactorEffects, TheInteractionOfTwoByTwoIsAPairedTest) {
   const GridValues grid = RandomGrid({2, 2}, 7, 3, {0, 1, 1, 3});
   std::vector<double> contrasts;
