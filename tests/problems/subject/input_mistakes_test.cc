@@ -101,6 +101,17 @@ TEST(SkinMistakes, SuspiciousSkinsAreNoted) {
   }
 }
 
+// Each of these skins passes for one that lies right over the skull, but its depths are not those
+// of the landmarks.
+TEST(SkinMistakes, AnotherPersonsSkinIsNotedByItsDepths) {
+  for (const std::uint64_t seed : {2, 3, 4, 5, 7, 8}) {
+    Head other = PhantomHead(1);
+    other.skin = PhantomHead(seed).skin;
+    const InputMistakes found = Find(other);
+    EXPECT_GE(found.notes.size() + found.errors.size(), 1u) << seed;
+  }
+}
+
 TEST(SkinMistakes, RealHeadsHaveNone) {
   for (const std::string name : {"vhm", "cthead", "cranium"}) {
     const std::filesystem::path folder =

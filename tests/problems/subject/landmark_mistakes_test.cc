@@ -236,6 +236,19 @@ TEST(LandmarkMistakes, DepthsInShiftedRowsAreNoted) {
   EXPECT_THAT(Find(subject).notes, ElementsAre(HasSubstr("depths of left and right differ")));
 }
 
+// Also at a site without a published depth, and for a depth that is too small.
+TEST(LandmarkMistakes, OneDepthInAnotherUnitIsNoted) {
+  for (const auto& [site, factor] : {std::pair("fe_l", 10.0), std::pair("zy_r", 0.1)}) {
+    Subject subject = RealSubject("vhm");
+    auto& landmarks = subject.file.landmarks;
+    const auto wrong = std::ranges::find(landmarks, site, &Landmark::site);
+    ASSERT_NE(wrong, landmarks.end());
+    *wrong->depth_along_normal_mm *= factor;
+    EXPECT_THAT(Find(subject).notes,
+                ElementsAre(AllOf(HasSubstr(site), HasSubstr("check both depths and their unit"))));
+  }
+}
+
 TEST(LandmarkMistakes, DepthsThatAreAllScaledAreNoted) {
   for (const auto& [head, factor] : {std::pair("cthead", 0.5), std::pair("vhm", 2.0)}) {
     Subject subject = RealSubject(head);
