@@ -48,6 +48,7 @@ struct AutoReport {
   double effective_share = 1;           // independent points per point, by correlated residuals
   double lattice_mm = 0;                // step of heights that were rounded to it; 0: they were not
   bool outliers_together = false;       // outliers stand together, as on a narrow ridge
+  bool has_long_tail = false;           // of the residuals; set by a caller that judges them
   bool weighted = false;                // the points' weights differ
   bool met_to_rounding = false;         // held-out points are met to 1e-8 of the extent
   bool limited_by_density = false;      // finer vertices would have too few points

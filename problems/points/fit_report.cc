@@ -68,6 +68,9 @@ std::string Verdict(const AutoReport& r) {
            "look "
            "at them before you leave them out (fit.plan.outliers: keep)";
   }
+  if (r.has_long_tail) {
+    return "residuals have a long tail: they are more than noise";
+  }
   if (SharesErrors(r)) {
     return "residuals are correlated, as errors that neighbours share: sd and intervals allow for "
            "it";
@@ -316,7 +319,10 @@ void WriteAttributes(const PointFit& result, OutputFolder& folder) {
 // Lines for the terminal, besides the figures.
 std::vector<std::string> TerminalNotes(const PointFitOptions& options, const PointFit& result,
                                        double chord_mm) {
-  std::vector<std::string> notes = result.notes;
+  std::vector<std::string> notes;
+  for (const std::string& note : result.notes) {
+    notes.push_back("note: " + note);
+  }
   if (std::isfinite(result.weighted_rms_mm)) {
     notes.push_back(fmt::format(
         "weighted RMS {}: points count by their weights, as in the fit; in the RMS they "

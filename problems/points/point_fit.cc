@@ -211,9 +211,12 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
     AddSigma(given, start, step, result);
   }
   ConvertWeights(options.fit.terms, result.fit);
+  std::string tail = TailText(given, result.fit, options.unit);
+  if (result.fit.automatic) {
+    result.fit.automatic->has_long_tail = !tail.empty();
+  }
   for (std::string text :
-       {TailText(given, result.fit, options.unit), WeightText(given, result.fit, options.unit),
-        ReliefText(given, result)}) {
+       {std::move(tail), WeightText(given, result.fit, options.unit), ReliefText(given, result)}) {
     if (!text.empty()) {
       notes.push_back(std::move(text));
     }
