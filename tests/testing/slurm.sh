@@ -50,6 +50,13 @@ PartitionName=all Nodes=n[1-3] Default=YES MaxTime=INFINITE State=UP
 END
   slurmctld -c -f "$folder/slurm.conf"
   for node in n1 n2 n3; do slurmd -N $node -f "$folder/slurm.conf"; done
+  # Fails where the daemons started but do not find each other, for example without a loopback device.
+  for attempt in $(seq 60); do
+    if [ "$(SLURM_CONF="$folder/slurm.conf" sinfo -h -t idle -o '%D' 2> /dev/null)" = 3 ]; then return 0; fi
+    sleep 0.5
+  done
+  echo "slurm.sh: the three nodes are not idle after 30 s" >&2
+  return 1
 }
 
 # The scripts of jobs on a node, with what they started and the daemon that watches over them.
