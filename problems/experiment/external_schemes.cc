@@ -147,8 +147,9 @@ std::optional<ExternalScheme> ReadExternalScheme(const ConfigNode& interp,
 
 namespace {
 
-// The reader of configurations lists the built-in schemes alone. Where there are schemes of one's
-// own, returns the complaint about a name that is neither, with all names; else "".
+// Returns the complaint about a name that is neither a built-in scheme nor one of `schemes`, with
+// all names, because the reader of configurations lists only the built-in ones. Empty for a known
+// name, and without `schemes`.
 std::string UnknownSchemeText(const ConfigNode& interp, std::span<const NamedScheme> schemes) {
   const DepthChoice* const built_in = nullptr;
   const std::string name = SchemeName(interp);

@@ -340,8 +340,8 @@ class MistakeSearch {
     return is_uneven;
   }
 
-  // One depth in another unit. Of 376 pairs of 54 heads (open-kbp CTs) none differs by more than
-  // 4.2 times, nor by more than 2.5 times and 10 mm.
+  // Finds one depth in another unit. No pair among 376 of 54 heads (open-kbp CTs) differs by more
+  // than 4.2 times, nor by more than 2.5 times and 10 mm.
   void NoteUnevenPairs() {
     constexpr double kMostFactor = 5, kLargeFactor = 2.5, kLarge_mm = 10;
     for (const Landmark& left : file_.landmarks) {
