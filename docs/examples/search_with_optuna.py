@@ -1,26 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tunes three options on some phantoms with Optuna, and judges the best on other phantoms.
 
-Several processes share one SQLite file. A second call with the same file continues the search, also after `kill -9`. A trial is pruned if its
-error after some steps of the schedule is worse than the median of the earlier trials after as many steps. Needs Debian's python3-optuna (3.1).
+Several processes share one SQLite file, and a second call continues the search, also after `kill -9`. A trial is pruned if its error after
+some steps of the schedule is above the median of the earlier trials after as many. Needs Debian's python3-optuna (3.1).
     PYTHONPATH=build/python python3 docs/examples/search_with_optuna.py --trials 60 --jobs 4 --phantoms 3
 """
 import argparse, concurrent.futures, functools, multiprocessing, pathlib, statistics
-import optuna
-import semblance
+import optuna, semblance
 
 CACHE = semblance.Cache(stages=40)  # a longer schedule repeats only the fit; trials share the phantoms
 
-# A coarse run, which takes a second. Remove the first line to search at the default resolution.
-QUICK = {"subject.rings": 24, "implicit.resolution": 60, "template.max_level": 1, "uncertainty.sigma": False,
-         "seeds.level": 0, "first_fit": [], "face": "fit"}
+# A coarse run, which takes a second.
+QUICK = {"subject.rings": 24, "implicit.resolution": 60, "template.max_level": 1, "uncertainty.sigma": False, "seeds.level": 0, "first_fit": [], "face": "fit"}
 SCHEDULE = [{"level": 0, "fraction": 0.5}, {"level": 0, "fraction": 0.8}, {"level": 1, "fraction": 0.5}]
 
 
 def error_mm(given, options, phantoms, steps):  # of the faces after the first steps of the schedule, on average
     options = {**QUICK, **options, "fit.plan.schedule": SCHEDULE[:steps]}
     runs = [semblance.run(given.config, set={**options, "subject.random_seed": seed}, cache=CACHE) for seed in phantoms]
-    return statistics.mean(float("inf") if run.faults else run.number("face.rms_mm") for run in runs)
+    return statistics.mean(run["face.rms_mm"] if run.usable else float("inf") for run in runs)
 
 
 def objective(trial, given):
@@ -40,8 +38,8 @@ def open_study(given, seed):
 
 
 def work(given, job):
-    trials = len(range(job, given.left, given.jobs))
-    open_study(given, given.first + job).optimize(lambda trial: objective(trial, given), n_trials=trials, catch=(semblance.InputError,))
+    study, trials = open_study(given, given.first + job), len(range(job, given.left, given.jobs))
+    study.optimize(lambda trial: objective(trial, given), n_trials=trials, catch=(semblance.InputError,))
 
 
 if __name__ == "__main__":
