@@ -20,7 +20,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -182,7 +181,6 @@ class Decimator {
   void SetGeometry(const Vec3& target);
   void GatherSamples();
   bool IsWithinBounds();
-  bool IsCheap(double cost) const;
   void Collapse();
   void ForgetEdges();
   void Forget(HalfedgeHandle side);
@@ -196,10 +194,10 @@ class Decimator {
   HalfEdges half_edges_;
   HalfEdgeMesh& edges_;  // of half_edges_
   std::vector<DecimatedVertex> vertices_;
-  std::optional<OriginalVertices> originals_;  // none: distances are not checked
-  std::vector<EdgeCost> costs_;                // per edge
-  std::vector<EdgeHandle> alive_;              // edges, ascending
-  std::vector<EdgeHandle> waiting_;            // edges that have a cost, ascending
+  OriginalVertices originals_;
+  std::vector<EdgeCost> costs_;      // per edge
+  std::vector<EdgeHandle> alive_;    // edges, ascending
+  std::vector<EdgeHandle> waiting_;  // edges that have a cost, ascending
   std::vector<float> cheapest_;
   float dearest_ = 0;  // the highest limit of a sweep so far
   EdgeNeighbourhood around_;
@@ -215,12 +213,10 @@ Decimator::Decimator(const TriMesh& mesh, const DecimateOptions& options)
       centre_(Bounds(mesh).center()),
       half_edges_(MakeHalfEdges(mesh)),
       edges_(half_edges_.mesh),
+      originals_(mesh),
       costs_(edges_.n_edges()),
       alive_(edges_.edges().begin(), edges_.edges().end()),
       triangles_(static_cast<int>(mesh.triangles.size())) {
-  if (options.check == DecimateCheck::kDistance) {
-    originals_.emplace(mesh);
-  }
   edges_.request_vertex_status();
   edges_.request_edge_status();
   edges_.request_face_status();
@@ -356,9 +352,7 @@ Remains Decimator::Run() {
 
 DecimateSummary Decimator::Summary() const {
   DecimateSummary summary{.triangles = triangles_};
-  if (originals_) {
-    summary.error_mm = originals_->LargestDistance_mm();
-  }
+  summary.error_mm = originals_.LargestDistance_mm();
   summary.stop = triangles_ <= options_.target_triangles ? DecimateStop::kTarget
                  : tolerance_refused_                    ? DecimateStop::kTolerance
                                                          : DecimateStop::kNoSoundCollapse;
@@ -420,12 +414,6 @@ void Decimator::TryCollapse(EdgeHandle edge) {
   if (!PreservesQuality(geometry_)) {
     return;
   }
-  if (!originals_) {
-    if (IsCheap(target.cost)) {
-      Collapse();
-    }
-    return;
-  }
   GatherSamples();
   MeasureCollapse(geometry_, error_);
   if (IsWithinBounds()) {
@@ -470,14 +458,14 @@ void Decimator::SetGeometry(const Vec3& target) {
 void Decimator::GatherSamples() {
   sampled_.clear();
   for (const std::int32_t t : around_.inner) {
-    originals_->AppendVertices(t, sampled_);
+    originals_.AppendVertices(t, sampled_);
   }
   for (const std::int32_t t : around_.outer) {
-    originals_->AppendVertices(t, sampled_);
+    originals_.AppendVertices(t, sampled_);
   }
   geometry_.samples.clear();
   for (const std::int32_t v : sampled_) {
-    geometry_.samples.push_back(originals_->Position(v));
+    geometry_.samples.push_back(originals_.Position(v));
   }
 }
 
@@ -491,25 +479,18 @@ bool Decimator::IsWithinBounds() {
     return false;
   }
   if (std::isfinite(options_.tolerance_mm)) {
-    error_mm = std::max(error_mm, originals_->DistanceBound_mm(geometry_.target, sampled_));
+    error_mm = std::max(error_mm, originals_.DistanceBound_mm(geometry_.target, sampled_));
   }
   tolerance_refused_ |= error_mm > options_.tolerance_mm;
   return error_mm <= options_.tolerance_mm;
 }
 
-// The bound of IsWithinBounds on the mean distance from the planes of the present triangles, which
-// is the cost over the area. The area vectors of the two sides of thin bone cancel.
-bool Decimator::IsCheap(double cost) const {
-  const double area = AreaVectorAfter(geometry_).norm();
-  return cost <= kMostErrorOfSize * kMostErrorOfSize * area * area;
-}
-
 void Decimator::ReassignSamples() {
   for (const std::int32_t t : around_.outer) {
-    originals_->Clear(t);
+    originals_.Clear(t);
   }
   for (std::size_t n = 0; n < sampled_.size(); ++n) {
-    originals_->Assign(around_.outer[error_.triangle_of[n]], sampled_[n], error_.distance_mm[n]);
+    originals_.Assign(around_.outer[error_.triangle_of[n]], sampled_[n], error_.distance_mm[n]);
   }
 }
 
@@ -569,8 +550,8 @@ Remains Decimator::RemainingMesh() {
     });
     remains.triangles.push_back(face.idx());
   }
-  if (std::isinf(options_.tolerance_mm) && originals_) {
-    originals_->Settle(
+  if (std::isinf(options_.tolerance_mm)) {
+    originals_.Settle(
         remains.triangles, [this](std::int32_t v) { return vertices_[v].hold != Hold::kFree; },
         mesh);
   }
@@ -586,9 +567,6 @@ void CheckDecimation(const TriMesh& mesh, const DecimateOptions& options) {
     throw InputError(
         fmt::format("decimate: a tolerance of {} mm is not possible; it must be positive",
                     options.tolerance_mm));
-  }
-  if (options.check == DecimateCheck::kNone && std::isfinite(options.tolerance_mm)) {
-    throw InputError("decimate: a tolerance needs the check of distances");
   }
   for (const Vec3& p : mesh.points) {
     if (!p.allFinite()) {

@@ -11,17 +11,11 @@
 
 namespace semblance::surfaces {
 
-enum class DecimateCheck { kDistance, kNone };
-
 struct DecimateOptions {
   int target_triangles = 4;  // collapses stop at this number; at least 4
   // The largest distance of a vertex of either mesh from the other mesh; > 0. Between the vertices
   // the distance may be a little larger.
   double tolerance_mm = std::numeric_limits<double>::infinity();
-  // kNone does not measure how far each collapse moves the surface from the original one, which
-  // takes half of the time. It is for a surface that is only looked at, and that keeps several
-  // times more triangles than its shape needs. It cannot keep a tolerance, and reports no error.
-  DecimateCheck check = DecimateCheck::kDistance;
 };
 
 // Why the collapses ended. "No sound collapse": every further collapse would turn a triangle by
@@ -34,7 +28,7 @@ constexpr auto EnumNames(DecimateStop) {
 
 struct DecimateSummary {
   int triangles = -1;  // in the result
-  // An upper bound on the distance of an original vertex from the result. NaN: not measured.
+  // An upper bound on the distance of an original vertex from the result.
   double error_mm = kNaN;
   DecimateStop stop = DecimateStop::kNotRun;
 };

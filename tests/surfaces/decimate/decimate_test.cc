@@ -294,22 +294,6 @@ TEST(Decimate, WithoutAToleranceTheVerticesSettleAmongTheOriginalOnes) {
   EXPECT_NEAR(SignedVolume(left), 1000, 1e-6);
 }
 
-TEST(Decimate, WithoutTheCheckOfDistancesTopologyAndShapeRemain) {
-  const TriMesh torus = Torus(120, 60);
-  const DecimateResult rough =
-      Decimate(torus, {.target_triangles = 4000, .check = DecimateCheck::kNone});
-  EXPECT_LE(rough.mesh.triangles.size(), 4000u);
-  EXPECT_TRUE(std::isnan(rough.summary.error_mm));
-  const EdgeReport edges = CheckEdges(rough.mesh);
-  EXPECT_EQ(edges.boundary + edges.non_manifold + edges.inconsistent, 0);
-  EXPECT_EQ(std::ssize(rough.mesh.points) - edges.edges + std::ssize(rough.mesh.triangles), 0);
-  const MeshQuery left(rough.mesh);
-  for (const Vec3& p : torus.points) {
-    EXPECT_LT(left.Closest(p).distance_mm, 0.15);  // a triangle of the result is 3 mm long
-  }
-  EXPECT_THROW(Decimate(torus, {.tolerance_mm = 1, .check = DecimateCheck::kNone}), InputError);
-}
-
 TEST(Decimate, AMeshInNoOrderIsDecimatedAsWellAndKeepsItsOrder) {
   const TriMesh torus = Torus(160, 80), mesh = Shuffled(torus);
   const DecimateResult sorted = Decimate(torus, {.target_triangles = 1000}),
