@@ -72,22 +72,11 @@ bool IsOutlier(const FitResult& fit, std::uint32_t k) {
   return fit.automatic && std::ranges::binary_search(fit.automatic->outliers, k);
 }
 
-// The distances of the points that are no outliers.
-std::vector<double> CountedDistances(const FitResult& fit) {
-  std::vector<double> distances_mm;
-  distances_mm.reserve(fit.residual_mm.size());
-  for (std::uint32_t k = 0; k < fit.residual_mm.size(); ++k) {
-    if (!IsOutlier(fit, k)) {
-      distances_mm.push_back(fit.residual_mm[k]);
-    }
-  }
-  return distances_mm;
-}
-
-// The distances times the roots of the weights: over the deviations, up to a factor. Without
-// weights, the distances.
-std::vector<double> WeightedDistances(const FitResult& fit, std::span<const double> weights) {
+// The distances of the points that are no outliers; with weights, over the deviations up to a
+// factor.
+std::vector<double> CountedDistances(const FitResult& fit, std::span<const double> weights = {}) {
   std::vector<double> distances;
+  distances.reserve(fit.residual_mm.size());
   for (std::uint32_t k = 0; k < fit.residual_mm.size(); ++k) {
     if (!IsOutlier(fit, k)) {
       distances.push_back(fit.residual_mm[k] * (weights.empty() ? 1 : std::sqrt(weights[k])));
@@ -159,7 +148,7 @@ std::string TailText(const GivenPoints& given, const FitResult& fit, std::string
   }
   const double rms_mm = RootMeanSquare(distances), median_mm = UpperMedian(distances);
   // Points of very different weights have a long tail without gross errors.
-  std::vector<double> weighted = WeightedDistances(fit, given.weights);
+  std::vector<double> weighted = CountedDistances(fit, given.weights);
   const double weighted_rms = RootMeanSquare(weighted), weighted_median = UpperMedian(weighted);
   return rms_mm > kLongTail * median_mm && weighted_rms > kLongTail * weighted_median
              ? fmt::format(
