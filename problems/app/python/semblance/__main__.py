@@ -8,6 +8,7 @@ from .errors import InputError, IoError
 from .experiments import run_study
 
 BAD_INPUT = 2
+MOST_LISTED = 20  # failed trials; the report has all
 
 
 def shard(text):
@@ -35,7 +36,7 @@ def main(arguments=None):
         print(f"semblance: {error}", file=sys.stderr)
         return BAD_INPUT
     print(counts["ranking"], end="")
-    for line in counts["failures"]:
+    for line in counts["failures"][:MOST_LISTED]:
         print("failed:", line)
     print("{trials} trials, {skipped} existed, {done} done, {failed} failed".format(**counts))
     return 1 if counts["failed"] else 0
