@@ -56,6 +56,7 @@ void LiveStudy::WaitForPage(std::chrono::milliseconds longest) {
 
 std::string LiveStudy::StateJson() {
   const std::lock_guard lock(mutex_);
+  knows_end_ = is_over_;
   return nlohmann::ordered_json{{"title", PlainText(title_)},
                                 {"words", EtaText(eta_)},
                                 {"finished", eta_.finished},
@@ -68,18 +69,19 @@ std::string LiveStudy::StateJson() {
 
 std::string LiveStudy::ReportPage() {
   const std::lock_guard one_at_a_time(report_mutex_);
-  bool is_over = false;
+  bool is_over = false, is_last = false;
   int finished = 0;
   {
     const std::lock_guard lock(mutex_);
     is_over = is_over_;
+    is_last = knows_end_;
     finished = eta_.finished;
   }
   if (finished != reported_ || is_over) {
     report_ = StudyReportHtml(ReadStudyResults(folder_, TrialCheck::kShown), folder_);
     reported_ = finished;
   }
-  if (is_over) {
+  if (is_last) {
     const std::lock_guard lock(mutex_);
     has_last_ = true;
     changed_.notify_all();

@@ -28,8 +28,8 @@ class LiveStudy {
   // States that the study has ended.
   void End();
 
-  // Waits until an open page has the last report, or for this time. Returns at once if no page has
-  // asked for anything in the last ten seconds.
+  // Waits until an open page knows the end and has the last report, or for this time. Returns at
+  // once if no page has asked for anything in the last ten seconds.
   void WaitForPage(std::chrono::milliseconds longest);
 
   // Answers "" (the page), its files, "api/state" (JSON) and "run/report.html" (the report of the
@@ -50,7 +50,10 @@ class LiveStudy {
   std::condition_variable changed_;
   StudyEta eta_;
   std::vector<std::string> failed_;  // the first failed trials of this run
-  bool is_over_ = false, has_last_ = false;
+  bool is_over_ = false;
+  // The last state that the page took has the end. A page that does not know it yet asks again.
+  bool knows_end_ = false;
+  bool has_last_ = false;  // the page has taken a report since it knows the end
   Clock::time_point asked_ = Clock::time_point::min();
 };
 
