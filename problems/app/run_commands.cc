@@ -105,6 +105,17 @@ void RequireSoundAlternatives(const std::filesystem::path& config, const Experim
   }
 }
 
+void PrintPlace(const std::filesystem::path& folder, const std::filesystem::path& config,
+                const Experiment& experiment) {
+  if (!experiment.report) {
+    Tell("folder: {}\n", folder.string());
+    return;
+  }
+  Tell("report: {}\n", (folder / "report.html").string());
+  Tell("next: open the report in a browser; semblance workbench {} changes this face there\n",
+       config.string());
+}
+
 int RunCommand(const Arguments& arguments) {
   KeepFreedMemory();
   const std::filesystem::path config = arguments.files.at(0);
@@ -132,9 +143,7 @@ int RunCommand(const Arguments& arguments) {
     PrintFaceError("first face", result.truth->implicit);
     PrintFaceError("recovered face", result.truth->face);
   }
-  Tell("report: {}\n", (folder.Root() / "report.html").string());
-  Tell("next: open the report in a browser; semblance workbench {} changes this face there\n",
-       config.string());
+  PrintPlace(folder.Root(), config, experiment);
   return PrintFaults(faults);
 }
 

@@ -283,6 +283,7 @@ struct Experiment {
   FaceSource face;
   BustSource bust;
   std::vector<Alternative> alternatives;
+  bool report = true;
   FeatureRules rules;
   std::vector<ScheduleStep> first_fit = {{.level = 0, .fraction = 1}};
   SeedSource seeds =
@@ -363,6 +364,10 @@ void Fields(Visitor& visit, Experiment& o) {
                          "run's, and side by side in the report, e.g. [{name: obese, set: "
                          "[\"tissue.build=obese\"]}]"},
         o.alternatives);
+  visit(FieldInfo{.name = "report",
+                  .doc = "write report.html, its pictures and its 3-D view; false: half of the "
+                         "time of a small head, and the other files are the same"},
+        o.report);
   visit(FieldInfo{.name = "rules",
                   .doc = "rules of the literature for eyes, mouth and nose, as observations for a "
                          "face that uses the prior; each is on if its points are given"},

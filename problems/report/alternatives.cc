@@ -250,6 +250,14 @@ class ComparedPictures {
   Box3 heads_, faces_;
 };
 
+void WriteComparedPictures(const std::vector<Answer>& answers, OutputFolder& folder, int threads) {
+  ComparedPictures pictures(answers, folder, threads);
+  for (const View view : {View::kFront, View::kThreeQuarter, View::kSide}) {
+    pictures.WriteHeads(view);
+  }
+  pictures.WriteDifferences();
+}
+
 }  // namespace
 
 std::vector<NamedExperiment> MakeAlternatives(const Experiment& experiment, const fs::path& folder,
@@ -319,11 +327,9 @@ std::vector<std::string> RunAlternatives(const Experiment& experiment,
     json.push_back(answer.json);
   }
   folder.Write("alternatives.json", WithPlainTexts(json).dump(2) + "\n");
-  ComparedPictures pictures(answers, folder, context.threads);
-  for (const View view : {View::kFront, View::kThreeQuarter, View::kSide}) {
-    pictures.WriteHeads(view);
+  if (experiment.report) {
+    WriteComparedPictures(answers, folder, context.threads);
   }
-  pictures.WriteDifferences();
   return faults;
 }
 

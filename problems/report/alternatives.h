@@ -41,7 +41,8 @@ CheckFindings CheckAlternatives(const std::vector<NamedExperiment>& named, const
 // lies
 //   outside the run's own, the landmarks and the run's own sites that have no dowel, and notes;
 // - pictures/alternatives_front.png, _three_quarter.png, _side.png and _difference.png.
-// Does nothing without alternatives. Returns the faults of unusable alternatives. Throws as Run.
+// With `report: false` no pictures. Does nothing without alternatives. Returns the faults of
+// unusable alternatives. Throws as Run.
 std::vector<std::string> RunAlternatives(const Experiment& experiment,
                                          const std::vector<NamedExperiment>& named,
                                          const RunResult& own, StageCache& cache,

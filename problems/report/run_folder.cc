@@ -196,16 +196,16 @@ void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolde
     folder.Write("seeds.csv", SeedsCsv(result));
     WriteMeshes(result, folder, context);
   });
-  step("write pictures", [&] {
-    WritePictures(result, folder, context);
-    WriteSections(result, folder);
-  });
-  step("write 3-D view", [&] { folder.Write("scene.json", SceneJson(result, context)); });
   const Json provenance = step("hash inputs", [&] { return Provenance(experiment, result); });
-  step("write report", [&] {
-    folder.Write("provenance.json", provenance.dump(2) + "\n");
-    WriteReport(folder);
-  });
+  folder.Write("provenance.json", provenance.dump(2) + "\n");
+  if (experiment.report) {
+    step("write pictures", [&] {
+      WritePictures(result, folder, context);
+      WriteSections(result, folder);
+    });
+    step("write 3-D view", [&] { folder.Write("scene.json", SceneJson(result, context)); });
+    step("write report", [&] { WriteReport(folder); });
+  }
   folder.Write("timing.json", TimingJson(step.Take()));
   folder.Write("manifest.json", ManifestJson(provenance, folder));
 }

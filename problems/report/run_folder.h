@@ -20,7 +20,8 @@ inline constexpr std::array<std::string_view, 19> kRunFiles = {
 
 // Writes resolved.yaml, result.json, timing.json, face.hspline.json, face.ply, implicit.ply,
 // depth.ply, dowels.csv, pictures/*.png, pictures/section_*.svg, scene.json (for the report's 3-D
-// view), provenance.json, report.html and, last, manifest.json. Each file is written as a whole or
+// view), provenance.json, report.html and, last, manifest.json; with `report: false` no pictures,
+// scene.json and report.html. Each file is written as a whole or
 // not at all. The same experiment gives the same bytes, except for timing.json. A folder without
 // manifest.json holds no finished run.
 void WriteRun(const Experiment& experiment, const RunResult& result, OutputFolder& folder,

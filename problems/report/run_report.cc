@@ -701,9 +701,19 @@ std::string RecordText(const Json& record) {
   return text;
 }
 
+void RequirePictures(const OutputFolder& folder) {
+  if (!std::filesystem::exists(folder.Root() / "pictures/overview.png")) {
+    throw IoError(
+        fmt::format("{}: it has no pictures, and the report needs them; make it again with "
+                    "`semblance run --set report=true`",
+                    folder.Root().string()));
+  }
+}
+
 Report BuildReport(const Json& result, const OutputFolder& folder) {
   Report report;
   report.title = result.at("title").get<std::string>();
+  RequirePictures(folder);
   report.subtitle = "Facial approximation of " + result.at("subject").get<std::string>() +
                     ". An approximation, not an identification." +
                     RecordText(result.value("record", Json::object()));

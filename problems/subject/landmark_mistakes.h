@@ -34,6 +34,7 @@ double SamePoint_mm(const Box3& extent);
 //   reversed        A note: two sites lie the other way round than on the average skull, as if
 //                   their names were exchanged.
 //   asymmetry       A note: a pair is far from symmetric, or a site of the middle lies beside it.
+//   depth order     A note: the depths are not thick and thin where those of people are.
 //   uneven depths   A note: the depths of left and right differ far more than those of people.
 //   depth level     A note: the depths are far smaller or larger than those of people.
 //   proportions     A note: the skull is stretched along one axis.

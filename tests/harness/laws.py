@@ -213,7 +213,7 @@ def read_marks(text):
 
 RINGS = 50  # edges of 5 mm, which the program refines; finer meshes take more time per case
 # A phantom's nasal bones may lie deeper than those of people: 8.1 mm are 5.1 standard deviations.
-FACE = {"title": "a face", "plausibility": {"depth_sds": 7}, "implicit": {"resolution": 60, "target_triangles": 4000}, "seeds": {"level": 1}, "first_fit": [],
+FACE = {"title": "a face", "report": False, "plausibility": {"depth_sds": 7}, "implicit": {"resolution": 60, "target_triangles": 4000}, "seeds": {"level": 1}, "first_fit": [],
         "template": {"type": "formula", "patches_u": 8, "patches_v": 8, "max_level": 2}, "uncertainty": {"sigma": False},
         "fit": {"plan": {"type": "listed", "schedule": [{"level": 0, "fraction": 1}, {"level": 1, "fraction": 1}]}}}
 HEADS = 3

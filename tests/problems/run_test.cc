@@ -492,6 +492,28 @@ TEST(Run, TheFolderHoldsWhatItsManifestListsInTheSameBytesForAnyNumberOfThreads)
   EXPECT_EQ(FilesOfRun(resolved, folder / "again", 2), one);
 }
 
+bool IsOfReport(const std::string& name) {
+  return name == "report.html" || name == "scene.json" || name.starts_with("pictures/");
+}
+
+TEST(Run, WithoutAReportTheOtherFilesAreTheSame) {
+  const ScratchFolder folder;
+  const RunResult result = problems::Run(SmallPhantom(), {});
+  std::map<bool, std::map<std::string, std::string>> files;
+  for (const bool report : {true, false}) {
+    OutputFolder output(folder / (report ? "with" : "without"), WhenNotEmpty::kRefuse);
+    WriteRun(SmallPhantom({fmt::format("report={}", report)}), result, output, {});
+    files[report] = FilesOf(output.Root());
+    for (const char* name : {"timing.json", "manifest.json", "resolved.yaml"}) {
+      EXPECT_EQ(files[report].erase(name), 1u) << name;  // the option is a line of resolved.yaml
+    }
+  }
+  EXPECT_GT(std::erase_if(files[true], [](const auto& file) { return IsOfReport(file.first); }), 9);
+  EXPECT_EQ(files[false], files[true]);
+  OutputFolder without(folder / "without", WhenNotEmpty::kReplaceFiles);
+  EXPECT_THAT(WordsOf<IoError>([&] { WriteReport(without); }), HasSubstr("it has no pictures"));
+}
+
 TEST(Run, ASkullWithoutLandmarksIsOneClearError) {
   const ScratchFolder folder;
   std::ofstream(folder / "e.yaml")

@@ -678,7 +678,8 @@ void Bench::StartVariants(const std::vector<BenchVariant>& variants) {
   });
 }
 
-RunFace Bench::MakeRun(const Experiment& experiment, const RunContext& context, int revision) {
+RunFace Bench::MakeRun(Experiment experiment, const RunContext& context, int revision) {
+  experiment.report = true;  // the page links to it
   std::shared_ptr<StageCache> stages;
   {
     const Lock lock(mutex_);

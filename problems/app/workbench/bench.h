@@ -231,7 +231,7 @@ class Bench {
   void Commit(BenchHistory history, bool by_job = false);
   void NoticeChangedFiles();
   void LoadStoredRun();
-  RunFace MakeRun(const Experiment& experiment, const RunContext& context, int revision);
+  RunFace MakeRun(Experiment experiment, const RunContext& context, int revision);
   std::string VariantsKey() const;
   Experiment MakeVariantExperiment(BenchVariant variant) const;
   void LoadStoredVariants();

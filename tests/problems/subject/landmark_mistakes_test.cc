@@ -227,12 +227,36 @@ TEST(LandmarkMistakes, ASiteBesideItsPlaceOnOneSideIsNoted) {
               ElementsAre(AllOf(HasSubstr("sites zy_l"), HasSubstr("from being mirror images"))));
 }
 
-TEST(LandmarkMistakes, DepthsInShiftedRowsAreNoted) {
-  Subject subject = RealSubject("cthead");
-  std::vector<Landmark>& landmarks = subject.file.landmarks;
-  for (std::size_t k = 0; k + 1 < landmarks.size(); ++k) {
-    landmarks[k].depth_along_normal_mm = landmarks[k + 1].depth_along_normal_mm;
+// Gives each site the depth `rows` rows further on in the file, among sites that end so.
+void ShiftDepths(Subject& subject, std::ptrdiff_t rows, const std::string& ending) {
+  std::vector<std::optional<double>*> depths;
+  std::vector<std::optional<double>> values;
+  for (Landmark& landmark : subject.file.landmarks) {
+    if (landmark.depth_along_normal_mm && landmark.site.ends_with(ending)) {
+      depths.push_back(&landmark.depth_along_normal_mm);
+      values.push_back(landmark.depth_along_normal_mm);
+    }
   }
+  for (std::size_t k = 0; k < depths.size(); ++k) {
+    *depths[k] = values[(k + static_cast<std::size_t>(std::ssize(depths) + rows)) % depths.size()];
+  }
+}
+
+TEST(LandmarkMistakes, DepthsInShiftedRowsAreNoted) {
+  for (const char* head : {"cthead", "vhm", "cranium"}) {
+    for (const std::ptrdiff_t rows : {1, -1, 2, 5}) {
+      Subject subject = RealSubject(head);
+      ShiftDepths(subject, rows, "");
+      EXPECT_THAT(Find(subject).notes,
+                  ElementsAre(HasSubstr("look whether each depth stands at its own site")))
+          << head << ", " << rows;
+    }
+  }
+}
+
+TEST(LandmarkMistakes, DepthsInRowsOfOneSideThatWereShiftedAreNoted) {
+  Subject subject = RealSubject("cthead");
+  ShiftDepths(subject, 1, "_l");
   EXPECT_THAT(Find(subject).notes, ElementsAre(HasSubstr("depths of left and right differ")));
 }
 
