@@ -139,7 +139,69 @@ std::string DescribeZeros(std::span<const Difference> row) {
              : "";
 }
 
+// The points of the sorted row up to the widest gap between their distances from the origin, if it
+// is wide enough for two units.
+std::size_t CountBeforeGap(std::span<const std::pair<double, std::size_t>> row) {
+  constexpr double kWideGap = 3;       // ratio of distances; the least factor is 10
+  constexpr std::size_t kOneIn = 50;   // points in each part at least; fewer may be strays
+  constexpr std::size_t kFewest = 10;  // of the same
+  const std::size_t fewest = std::max(row.size() / kOneIn, kFewest);
+  std::size_t best = 0;
+  double widest = kWideGap;
+  for (std::size_t k = fewest; k + fewest < row.size(); ++k) {
+    if (const double gap = row[k].first / row[k - 1].first; gap > widest) {
+      widest = gap;
+      best = k;
+    }
+  }
+  return best;
+}
+
+// Returns whether the box `less`, multiplied by the factor, lies in the place of the other: along
+// two axes they share most of their length, and along the third they are not far apart.
+bool CoverEachOther(const Box3& less, const Box3& more, double factor) {
+  constexpr double kShared = 0.5;  // of the union
+  int shared = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const double low = factor * less.min()[axis], high = factor * less.max()[axis],
+                 both = std::min(high, more.max()[axis]) - std::max(low, more.min()[axis]),
+                 all = std::max(high, more.max()[axis]) - std::min(low, more.min()[axis]);
+    shared += both > kShared * all;
+    if (-both > kShared * all) {
+      return false;
+    }
+  }
+  return shared >= 2;
+}
+
 }  // namespace
+
+std::string FindPartInAnotherUnit(std::span<const Vec3> positions) {
+  constexpr std::size_t kMost = 20'000;  // points that are looked at; more take more time
+  std::vector<std::pair<double, std::size_t>> row;
+  for (std::size_t k = 0; k < positions.size(); k += positions.size() / kMost + 1) {
+    row.emplace_back(positions[k].norm(), k);
+  }
+  std::ranges::sort(row);
+  const std::size_t near = CountBeforeGap(row);
+  if (near == 0) {
+    return "";
+  }
+  Box3 less, more;
+  for (std::size_t n = 0; n < row.size(); ++n) {
+    (n < near ? less : more).extend(positions[row[n].second]);
+  }
+  for (const double factor : {10.0, 12.0, 25.4, 100.0, 1000.0}) {
+    if (CoverEachOther(less, more, factor)) {
+      return fmt::format(
+          "{:.0f} % of the points, such as number {}, lie near the origin, and times {} they lie "
+          "among the others: a part of the file may be in another unit; bring all points to one",
+          100.0 * static_cast<double>(near) / static_cast<double>(row.size()), row[0].second + 1,
+          factor);
+    }
+  }
+  return "";
+}
 
 std::vector<std::string> FindHeightMistakes(std::span<const Vec3> positions,
                                             std::span<const Vec2> uv) {

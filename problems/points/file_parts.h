@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Finds mistakes in heights that only neighbours show: a part of the file with another zero, and
-// zeros in place of missing heights.
+// Finds mistakes that a part of the points shows beside the others: heights with another zero,
+// zeros in place of missing heights, points in another unit.
 #pragma once
 
 #include <span>
@@ -20,5 +20,9 @@ namespace semblance::problems {
 //           than other points do.
 std::vector<std::string> FindHeightMistakes(std::span<const Vec3> positions,
                                             std::span<const Vec2> uv);
+
+// States that some points lie far nearer to the origin than the others, and among these if they are
+// multiplied by a factor between two units (10, 12, 25.4, 100, 1000); empty if there are none.
+std::string FindPartInAnotherUnit(std::span<const Vec3> positions);
 
 }  // namespace semblance::problems

@@ -3,7 +3,10 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 #include <utility>
 
 #include "problems/points/file_parts.h"
@@ -42,6 +45,53 @@ std::string GapText(std::vector<Vec2> uv) {
   return "";
 }
 
+// Least squares of z = a x + b y + c over a sample.
+struct Trend {
+  Vec2 slope = Vec2::Zero();
+  double explained = 0;  // share of the variance of z
+};
+Trend FindTrend(std::span<const Vec3> positions) {
+  constexpr std::size_t kMost = 20'000;  // points; more take more time
+  std::vector<Vec3> sample;
+  Vec3 mean = Vec3::Zero();
+  for (std::size_t k = 0; k < positions.size(); k += positions.size() / kMost + 1) {
+    sample.push_back(positions[k]);
+    mean += positions[k];
+  }
+  mean /= static_cast<double>(sample.size());
+  Mat3 moments = Mat3::Zero();
+  for (const Vec3& p : sample) {
+    moments += (p - mean) * (p - mean).transpose();
+  }
+  const Vec2 with_z = moments.col(2).head<2>();
+  const Eigen::Matrix2d of_xy = moments.topLeftCorner<2, 2>();
+  const Vec2 slope = of_xy.ldlt().solve(with_z);
+  return {slope, slope.dot(with_z) / moments(2, 2)};
+}
+
+// States that points which were taken as heights over x and y may be a scan in another pose: they
+// lie along a steep plane. Noise and detail count along z, and are magnified there. Beyond 80
+// degrees z has another unit.
+std::string SteepText(const PointTable& table, const PreparedPoints& placed) {
+  constexpr double kLeastExplained = 0.8, kSteepest = 5.67;
+  if (!placed.parameters.is_graph || table.has_map_columns ||
+      placed.parameters.source != ParameterSource::kPlane) {
+    return "";
+  }
+  const Trend trend = FindTrend(table.positions);
+  const double slope = trend.slope.norm();
+  if (!(trend.explained > kLeastExplained && slope > 1 && slope < kSteepest)) {
+    return "";
+  }
+  const Vec3 normal = Vec3(-trend.slope.x(), -trend.slope.y(), 1).normalized();
+  return fmt::format(
+      "the points rise along a plane that is tilted by {:.0f} degrees, and are taken as heights z "
+      "over x and y; if z has the unit of x and y, as in a scan, parameters: {{type: plane, "
+      "normal: "
+      "[{:.3g}, {:.3g}, {:.3g}]}} fits them more closely",
+      std::atan(slope) * 180 / std::numbers::pi, normal.x(), normal.y(), normal.z());
+}
+
 }  // namespace
 
 std::vector<std::string> FindNotes(const PointTable& table, const PointsOut& out,
@@ -60,6 +110,11 @@ std::vector<std::string> FindNotes(const PointTable& table, const PointsOut& out
         "level 0 has {} x {} patches in place of {} x {}, by the shape of "
         "the domain; patches_by_shape: false keeps them",
         placed.shape.patches_u, placed.shape.patches_v, asked.patches_u, asked.patches_v));
+  }
+  for (std::string text : {SteepText(table, placed), FindPartInAnotherUnit(table.positions)}) {
+    if (!text.empty()) {
+      notes.push_back(std::move(text));
+    }
   }
   if (options.closure == Closure::kOpen) {
     if (std::string gap = GapText(placed.parameters.uv); !gap.empty()) {

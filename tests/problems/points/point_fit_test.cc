@@ -523,6 +523,46 @@ TEST(PointFit, APartOfTheFileWithAnotherZeroIsNoted) {
   EXPECT_FALSE(HasNote(sorted, "those behind them"));
 }
 
+// In any place of the file, beside the origin or around it, and with its heights in the same unit.
+TEST(PointFit, APartOfTheFileInAnotherUnitIsNoted) {
+  constexpr char kWords[] = "a part of the file may be in another unit";
+  const PointTable hills = Hills(600, 60, 0.01, 3);
+  for (const Vec3& origin : {Vec3(500, 900, 200), Vec3(-30, -30, 0)}) {
+    PointTable sound = hills;
+    std::ranges::for_each(sound.positions, [&](Vec3& p) { p += origin; });
+    EXPECT_FALSE(HasNote(sound, kWords));
+    for (const double factor : {1e-3, 1e2}) {
+      PointTable behind = sound, scattered = sound;
+      for (std::size_t k = 0; k < sound.positions.size(); ++k) {
+        behind.positions[k] *= k < 400 ? 1 : factor;
+        scattered.positions[k] *= k % 3 != 0 ? 1 : factor;
+      }
+      EXPECT_TRUE(HasNote(behind, kWords)) << origin.x() << ", " << factor;
+      EXPECT_TRUE(HasNote(scattered, kWords)) << origin.x() << ", " << factor;
+    }
+  }
+}
+
+// A scan in a steep pose. Heights whose unit makes them steeper, and level ones, are heights.
+TEST(PointFit, HeightsAlongASteepPlaneAreNoted) {
+  constexpr char kWords[] = "tilted by 60 degrees";
+  const PointTable hills = Hills(600, 60, 0.01, 3);
+  const auto turned = [&](double degrees, double factor) {
+    PointTable table = hills;
+    const Eigen::AngleAxisd turn(degrees * std::numbers::pi / 180, Vec3::UnitX());
+    for (Vec3& p : table.positions) {
+      p = (turn * Vec3(p.x(), p.y(), 0.2 * p.z())).cwiseProduct(Vec3(1, 1, factor));
+    }
+    return table;
+  };
+  EXPECT_TRUE(HasNote(turned(60, 1), kWords));
+  PointTable named = turned(60, 1);
+  named.has_map_columns = true;
+  for (const PointTable& heights : {turned(20, 1), turned(60, 1000), named}) {
+    EXPECT_FALSE(HasNote(heights, "tilted by"));
+  }
+}
+
 // A third of the points has ten times the standard deviation that is stated for the others.
 TEST(PointFit, StandardDeviationsAsWeightsAreNoted) {
   constexpr char kWords[] = "points of great weight lie farther from the surface";
