@@ -8,7 +8,8 @@ from .errors import InputError
 def refuse_masked(values, name):
     """Raise InputError for an array with masked rows or complex numbers, which NumPy would use as if they were plain."""
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
-        rows = np.flatnonzero(np.ma.getmaskarray(values).reshape(len(values), -1).any(axis=1))
+        mask = np.atleast_1d(np.ma.getmaskarray(values))
+        rows = np.flatnonzero(mask.reshape(len(mask), -1).any(axis=1))
         raise InputError(f"{name}: {len(rows)} rows are masked, the first is row {rows[0]}; leave them out of all arrays, e.g. points[~mask]")
     if isinstance(values, np.ndarray) and values.dtype.kind == "c":
         raise InputError(f"{name}: Complex data not supported; give real numbers")

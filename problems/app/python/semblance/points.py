@@ -87,11 +87,11 @@ class PointFit:
         """
         if self._evidence is None:
             raise InputError("predict needs heights over x and y, and a fit by plan: auto with solver: fastest")
-        return _semblance.predict(self.surface._surface, self._evidence, xy, level, threads)
+        return _semblance.predict(self.surface._surface, self._evidence, floats(xy, "xy"), level, threads)
 
     def __call__(self, x, y) -> np.ndarray:
         """Return the predicted heights at x and y, in their broadcast shape."""
-        x, y = np.broadcast_arrays(np.asarray(x, float), np.asarray(y, float))
+        x, y = np.broadcast_arrays(floats(x, "x"), floats(y, "y"))
         return self.predict(np.column_stack([x.ravel(), y.ravel()]))["z"].reshape(x.shape)
 
     def __eq__(self, other):

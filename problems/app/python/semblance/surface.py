@@ -5,6 +5,7 @@ import os
 import numpy as np
 
 from . import _semblance
+from .arrays import floats
 from .errors import InputError
 
 
@@ -27,7 +28,7 @@ class HSpline:
     __hash__ = None
 
     def __init__(self, level0, max_level: int = 0, periodic_u: bool = False):
-        self._surface = _semblance.Surface(level0, max_level, periodic_u)
+        self._surface = _semblance.Surface(floats(level0, "level0"), max_level, periodic_u)
 
     @classmethod
     def _of(cls, surface):
@@ -70,7 +71,7 @@ class HSpline:
 
     def __call__(self, u, v, clamp: bool = False) -> np.ndarray:
         """Return the points at (u, v): an array of the broadcast shape of u and v, with a last axis of 3."""
-        u, v = np.broadcast_arrays(np.asarray(u, float), np.asarray(v, float))
+        u, v = np.broadcast_arrays(floats(u, "u"), floats(v, "v"))
         return self.points(np.column_stack([u.ravel(), v.ravel()]), clamp=clamp).reshape(*u.shape, 3)
 
     def points(self, uv, threads: int = 1, clamp: bool = False) -> np.ndarray:
@@ -90,7 +91,7 @@ class HSpline:
 
     def project(self, points) -> tuple[np.ndarray, np.ndarray]:
         """Return (uv, distance_mm) of the closest points of the surface to n x 3 points."""
-        return self._surface.project(points)
+        return self._surface.project(floats(points, "points"))
 
     def mesh(self, per_patch: int = 4) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return (vertices, triangles, uv), with per_patch quads along each side of a finest patch."""
@@ -102,7 +103,7 @@ class HSpline:
 
     def set_net(self, level: int, net) -> None:
         """Set the control vertices of a level. Finer detail moves with them."""
-        self._surface.set_net(level, net)
+        self._surface.set_net(level, floats(net, "net"))
 
     def edit(self, script) -> None:
         """Apply the edits of a script, as `semblance edit` does."""
@@ -136,7 +137,7 @@ class HSpline:
 
 
 def _domain(uv, clamp):
-    uv = np.asarray(uv, float)
+    uv = floats(uv, "uv")
     if clamp:
         return np.clip(uv, 0, 1)
     if uv.ndim == 2:

@@ -239,6 +239,14 @@ class Fit(unittest.TestCase):
         masked[5, 2] = np.ma.masked
         with self.assertRaisesRegex(semblance.InputError, "points: [0-9]+ rows are masked, the first is row"):
             semblance.fit(masked)
+        surface = semblance.fit(paraboloid(9))
+        places = np.ma.masked_less(paraboloid(9)[:, :2], 3)
+        for call in (surface.predict, lambda xy: surface(xy[:, 0], xy[:, 1]), surface.surface.points, lambda uv: surface.surface(uv[:, 0], uv[:, 1]),
+                     lambda xy: surface.surface.project(np.ma.column_stack([xy, xy[:, 0]]))):
+            with self.assertRaisesRegex(semblance.InputError, "rows are masked"):
+                call(places)
+        with self.assertRaisesRegex(semblance.InputError, "u: 1 rows are masked"):
+            surface.surface(np.ma.masked, 0.5)
         with self.assertRaisesRegex(semblance.InputError, "points: Complex data not supported"):
             semblance.fit(paraboloid(9) + 1j)
         with self.assertRaisesRegex(semblance.InputError, "threads is 0"):
