@@ -8,11 +8,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <utility>
 
 #include "fitting/parameters/point_map.h"
 #include "surfaces/base/error.h"
+#include "surfaces/base/quantile.h"
 
 namespace semblance::fitting {
 namespace {
@@ -426,8 +428,28 @@ void CheckEnds(const Scan& scan, const CylinderAxis& axis) {
   }
 }
 
+// The cylinder along the axis, cut open, for a sheet that is bent round it. A zero axis is found.
+std::optional<PointMap> OpenCylinder(std::span<const Vec3> points, const Vec3& axis) {
+  return CutOpen(
+      CylindersAround(points, axis.isZero(0) ? DirectionAcrossNormals(points) : axis).make(0));
+}
+
+MapChoice CylindersFor(const Scan& scan, const CylinderParameters& cylinder) {
+  const Vec3 axis(cylinder.axis.data());
+  if (scan.closure == Closure::kPeriodicU) {
+    return CylindersAround(scan.positions, axis);
+  }
+  std::optional<PointMap> open = OpenCylinder(scan.positions, axis);
+  if (!open) {
+    FailParameters(
+        "the points go round the cylinder without an empty sector of 20 degrees, in which the "
+        "surface could end; write closure: periodic_u");
+  }
+  return {1, [open = std::move(*open)](int) { return open; }};
+}
+
 Parametrisation ParametriseBy(const Scan& scan, const CylinderParameters& cylinder) {
-  CheckedMap best = BestMap(scan, CylindersAround(scan.positions, Vec3(cylinder.axis.data())));
+  CheckedMap best = BestMap(scan, CylindersFor(scan, cylinder));
   if (!MayBeTaken(best, cylinder.folds)) {
     FailParameters(fmt::format(
         "the points fold over the cylinder, or close at its ends, where their angle is not known: "
@@ -463,6 +485,29 @@ Parametrisation ParametriseBy(const Scan& scan, const MeshParameters& mesh) {
 
 // ----------------------------------------------------------------------- auto
 
+// The cylinder round which the points are bent as a sheet that does not close: they neither fold
+// over it nor close at its ends, and lie at similar distances from it.
+std::optional<CheckedMap> BentSheet(const Scan& scan) {
+  // Trades sheets that are bent more unevenly than an ellipse of 3 : 1 for solids and shells.
+  constexpr double kMostUneven = 0.4;  // interquartile range of the distances, over their median
+  std::optional<PointMap> open = OpenCylinder(scan.positions, Vec3::Zero());
+  if (!open) {
+    return std::nullopt;
+  }
+  CheckedMap sheet{.map = std::move(*open), .faults = {}, .looked_at = {}};
+  sheet.faults = FindFaults(scan, sheet.map);
+  const CylinderAxis& axis = sheet.map.axis;
+  std::vector<double> distances;
+  for (const Vec3& p : scan.positions) {
+    distances.push_back(axis.DistanceTo(p));
+  }
+  const double spread = Quantile(distances, 0.75) - Quantile(distances, 0.25);
+  const bool is_sheet = sheet.faults.Sum() <= kMostFaults &&
+                        spread < kMostUneven * Quantile(distances, 0.5) &&
+                        !FindEnds(scan.positions, axis).Close();
+  return is_sheet ? std::optional(std::move(sheet)) : std::nullopt;
+}
+
 Parametrisation ParametriseBy(Scan scan, const AutoParameters&) {
   if (!scan.given_uv.empty()) {
     return ParametriseBy(std::move(scan), GivenParameters{});
@@ -474,10 +519,13 @@ Parametrisation ParametriseBy(Scan scan, const AutoParameters&) {
   if (MayBeTaken(plane, FoldRule::kRefuse)) {
     return Take(std::move(plane), ParameterSource::kPlane);
   }
-  if (scan.triangles.empty()) {
-    RefusePlanes(plane);
+  if (!scan.triangles.empty()) {
+    return ParametriseBy(scan, MeshParameters{});
   }
-  return ParametriseBy(scan, MeshParameters{});
+  if (std::optional<CheckedMap> bent = BentSheet(scan)) {
+    return Take(std::move(*bent), ParameterSource::kCylinder);
+  }
+  RefusePlanes(plane);
 }
 
 void CheckScan(const Scan& scan) {

@@ -71,7 +71,8 @@ void Fields(Visitor& visit, PlaneParameters& o) {
   FoldField(visit, o.folds);
 }
 
-// Angle around an axis (u, closed) and height along it (v), for points that go round.
+// Angle around an axis (u) and height along it (v), for points that go round, or are bent round the
+// axis but for a sector (closure: open).
 struct CylinderParameters {
   static constexpr std::string_view kName = "cylinder";
   std::array<double, 3> axis = {0, 0, 0};
@@ -82,7 +83,8 @@ void Fields(Visitor& visit, CylinderParameters& o) {
   visit(FieldInfo{.name = "axis",
                   .doc = "direction of v; [0, 0, 0] takes the principal axis of the points from "
                          "which their distances differ least, or, where they fold over its "
-                         "cylinder, the principal axis over whose cylinder they fold least"},
+                         "cylinder, the principal axis over whose cylinder they fold least; for an "
+                         "open sheet, the direction across its normals"},
         o.axis);
   FoldField(visit, o.folds);
 }

@@ -152,6 +152,35 @@ PointMap OnCylinder(std::span<const Vec3> points, const CylinderAxis& axis) {
   return map;
 }
 
+// The widest sector without points and the next one, in turns.
+struct AngleGaps {
+  double widest = 0, end = kNaN;  // end: angle at which the widest one ends
+  double next = 0;
+};
+AngleGaps FindGaps(std::span<const Vec2> at) {
+  constexpr int kSectors = 1440;
+  std::vector<bool> is_empty(kSectors, true);
+  for (const Vec2& p : at) {
+    is_empty[std::min(static_cast<int>(p.x() * kSectors), kSectors - 1)] = false;
+  }
+  const int first = static_cast<int>(std::ranges::find(is_empty, false) - is_empty.begin());
+  AngleGaps gaps;
+  for (int k = first, empty = 0; k <= first + kSectors; ++k) {  // from a sector with points
+    if (is_empty[k % kSectors]) {
+      ++empty;
+      continue;
+    }
+    const double gap = static_cast<double>(empty) / kSectors;
+    if (gap > gaps.widest) {
+      gaps = {.widest = gap, .end = static_cast<double>(k) / kSectors, .next = gaps.widest};
+    } else {
+      gaps.next = std::max(gaps.next, gap);
+    }
+    empty = 0;
+  }
+  return gaps;
+}
+
 }  // namespace
 
 double CylinderAxis::DistanceTo(const Vec3& p) const {
@@ -192,6 +221,47 @@ MapChoice CylindersAround(std::span<const Vec3> points, const Vec3& axis) {
       axis.isZero(0) ? PrincipalAxes(points) : std::vector{AxisAlong(axis, points)};
   const int count = static_cast<int>(axes.size());
   return {count, [=](int k) { return OnCylinder(points, axes[static_cast<std::size_t>(k)].axis); }};
+}
+
+Vec3 DirectionAcrossNormals(std::span<const Vec3> points) {
+  // Neighbours among some thousand points lie farther apart than the noise of most scans.
+  constexpr std::size_t kPoints = 4000, kPlanes = 400, kNeighbours = 12;
+  std::vector<Vec3> sample;
+  for (std::size_t k = 0; k < points.size(); k += points.size() / kPoints + 1) {
+    sample.push_back(points[k]);
+  }
+  const std::size_t neighbours = std::min(kNeighbours, sample.size());
+  Mat3 across = Mat3::Zero();
+  for (std::size_t k = 0; k < sample.size(); k += sample.size() / kPlanes + 1) {
+    std::vector<Vec3> near = sample;
+    std::ranges::nth_element(
+        near, near.begin() + static_cast<std::ptrdiff_t>(neighbours) - 1, {},
+        [&, centre = sample[k]](const Vec3& p) { return (p - centre).squaredNorm(); });
+    near.resize(neighbours);
+    const Vec3 normal = FindPrincipalFrame(near).axes.col(0);
+    across += normal * normal.transpose();
+  }
+  return Eigen::SelfAdjointEigenSolver<Mat3>(across).eigenvectors().col(0);
+}
+
+std::optional<PointMap> CutOpen(PointMap cylinder) {
+  // A gap of 20 degrees beyond chance. Columns of a regular scan leave gaps of equal widths.
+  constexpr double kLeast = 20.0 / 360, kBeyondChance = 10, kWiderThanNext = 2;
+  const AngleGaps gaps = FindGaps(cylinder.at);
+  const double gap = gaps.widest;
+  if (!(gap >= std::max(kLeast, kBeyondChance / static_cast<double>(cylinder.at.size())) &&
+        gap > kWiderThanNext * gaps.next)) {
+    return std::nullopt;
+  }
+  const double cut = gaps.end - gap / 2;
+  for (Vec2& p : cylinder.at) {
+    const double turns = p.x() - cut;
+    p.x() = (turns - std::floor(turns)) * cylinder.unit_mm.x();
+  }
+  cylinder.unit_mm = Vec2::Ones();
+  cylinder.goes_round = false;
+  cylinder.how += fmt::format(", cut open where {:.0f} degrees are empty", 360 * gap);
+  return cylinder;
 }
 
 CylinderEnds FindEnds(std::span<const Vec3> points, const CylinderAxis& axis) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -50,6 +51,17 @@ MapChoice PlanesOver(std::span<const Vec3> points, const Vec3& normal);
 // least squares (Kasa) through the points as seen along it.
 //   points: referred to by `make`.
 MapChoice CylindersAround(std::span<const Vec3> points, const Vec3& axis);
+
+// The direction to which the points' surface is most nearly parallel everywhere, as a bent sheet is
+// to the axis round which it is bent: across the normals of the planes of least squares through
+// some hundred points and their neighbours. Unit.
+Vec3 DirectionAcrossNormals(std::span<const Vec3> points);
+
+// A cylinder's map, cut open along the middle of the widest sector without points and rolled out:
+// angles become lengths at the points' mean distance from the axis. Nothing if no sector is wide
+// enough: 20 degrees, twice as wide as any other, and far wider than chance leaves between that
+// many points.
+std::optional<PointMap> CutOpen(PointMap cylinder);
 
 // Distances of the points from the axis of their cylinder.
 struct CylinderEnds {

@@ -24,9 +24,6 @@ HSplineShape ShapeFor(const PointFitOptions& options) {
 
 std::string ClosureFault(const PointFitOptions& options) {
   const bool goes_round = options.closure == Closure::kPeriodicU;
-  if (std::holds_alternative<CylinderParameters>(options.parameters) && !goes_round) {
-    return "parameters on a cylinder go round in u; write closure: periodic_u";
-  }
   if (std::holds_alternative<PlaneParameters>(options.parameters) && goes_round) {
     return "parameters on a plane do not go round; write closure: open";
   }

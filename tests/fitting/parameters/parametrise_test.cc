@@ -53,6 +53,10 @@ TEST(Parametrise, APlaneAcrossANormalHasItsHeights) {
   }
 }
 
+Scan GoingRound(std::span<const Vec3> points) {
+  return {.positions = points, .closure = Closure::kPeriodicU};
+}
+
 // Angles and heights come back in any pose, but for the start and the sense of the angle.
 TEST(Parametrise, ACylinderFindsItsAxis) {
   const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).matrix();
@@ -60,7 +64,7 @@ TEST(Parametrise, ACylinderFindsItsAxis) {
   for (int k = 0; k < 400; ++k) {
     points.push_back(OnCylinder(k, turn));
   }
-  const Parametrisation p = Parametrise(points, CylinderParameters{});
+  const Parametrisation p = Parametrise(GoingRound(points), CylinderParameters{});
   EXPECT_EQ(p.source, ParameterSource::kCylinder);
   const double up = p.uv[399].y() > p.uv[0].y() ? 1 : -1;
   for (int k = 0; k < 400; ++k) {
@@ -133,13 +137,12 @@ TEST(Parametrise, FoldsOverEveryPlaneAreRefusedUnlessAccepted) {
 TEST(Parametrise, ACylinderOnWhichLidsCollapseIsRefusedOrLeft) {
   const std::vector<Vec3> tin = Tin(20000);
   const CylinderParameters upright{.axis = {0, 0, 1}};
-  EXPECT_THAT(WordsOf({.positions = tin}, upright), HasSubstr("close at its ends"));
-  const Parametrisation other = Parametrise(Scan{.positions = tin, .closure = Closure::kPeriodicU});
+  EXPECT_THAT(WordsOf(GoingRound(tin), upright), HasSubstr("close at its ends"));
+  const Parametrisation other = Parametrise(GoingRound(tin));
   EXPECT_EQ(other.source, ParameterSource::kCylinder);
   EXPECT_LT(other.faults.Sum(), 0.02);
-  EXPECT_GT(Parametrise(tin, CylinderParameters{.axis = {0, 0, 1}, .folds = FoldRule::kAccept})
-                .faults.collapsed,
-            0.1);
+  const CylinderParameters accepted{.axis = {0, 0, 1}, .folds = FoldRule::kAccept};
+  EXPECT_GT(Parametrise(GoingRound(tin), accepted).faults.collapsed, 0.1);
 }
 
 TEST(Parametrise, AutoTakesTheCylinderForASurfaceThatGoesRound) {
@@ -160,6 +163,62 @@ TEST(Parametrise, ATubeThatIsCutAslantStaysACylinder) {
   }
   const Parametrisation p = Parametrise(Scan{.positions = points, .closure = Closure::kPeriodicU});
   EXPECT_EQ(p.source, ParameterSource::kCylinder);
+}
+
+// Points of a sheet that is bent round an axis by some degrees, with waves of 5 % of the radius.
+std::vector<Vec3> BentSheet(double degrees, const Mat3& turn) {
+  Random random(4);
+  std::vector<Vec3> points;
+  for (int k = 0; k < 3000; ++k) {
+    const double angle = degrees * std::numbers::pi / 180 * random.Uniform(),
+                 z = 80 * random.Uniform(), r = 30 + 1.5 * std::sin(5 * angle) * std::cos(z / 9);
+    points.emplace_back(turn * Vec3(r * std::cos(angle), r * std::sin(angle), z) +
+                        Vec3(500, -20, 7));
+  }
+  return points;
+}
+
+// Lengths round the axis and along it come back, but for the start and the senses.
+TEST(Parametrise, ASheetThatIsBentRoundAnAxisIsRolledOut) {
+  const Mat3 turn = Eigen::AngleAxisd(0.7, Vec3(1, -2, 0.5).normalized()).matrix();
+  for (const double degrees : {220.0, 250.0, 330.0}) {
+    const std::vector<Vec3> points = BentSheet(degrees, turn);
+    for (const Parameters& parameters :
+         {Parameters(AutoParameters{}), Parameters(CylinderParameters{})}) {
+      const Parametrisation p = Parametrise(points, parameters);
+      EXPECT_EQ(p.source, ParameterSource::kCylinder) << degrees;
+      EXPECT_LT(p.faults.Sum(), 0.002);
+      const double round_mm = 30 * degrees * std::numbers::pi / 180;
+      EXPECT_NEAR(p.lengths_mm.maxCoeff(), std::max(round_mm, 80.0), 0.05 * round_mm);
+      EXPECT_NEAR(p.lengths_mm.minCoeff(), std::min(round_mm, 80.0), 0.05 * round_mm);
+    }
+  }
+}
+
+TEST(Parametrise, ATubeThatClosesHasNoOpenCylinder) {
+  const std::vector<Vec3> tube = BentSheet(360, Mat3::Identity());
+  std::vector<Vec3> columns;  // 12 of them, 30 degrees apart
+  for (int k = 0; k < 600; ++k) {
+    const double angle = k % 12 * std::numbers::pi / 6;
+    columns.emplace_back(30 * std::cos(angle), 30 * std::sin(angle), k / 12);
+  }
+  for (const std::vector<Vec3>& points : {tube, columns}) {
+    EXPECT_THAT(WordsOf({.positions = points}, CylinderParameters{}), HasSubstr("periodic_u"));
+  }
+  EXPECT_THAT(WordsOf({.positions = tube}, AutoParameters{}), HasSubstr("fold over"));
+}
+
+// A ball of which a slice is missing, and a filled tube of which one is missing.
+TEST(Parametrise, WhatClosesAtItsEndsOrIsFilledIsNoBentSheet) {
+  std::vector<Vec3> ball = OnSphere(4000), filled;
+  std::erase_if(ball, [](const Vec3& p) { return std::abs(std::atan2(p.y(), p.x())) < 0.4; });
+  Random random(8);
+  for (const Vec3& p : BentSheet(300, Mat3::Identity())) {
+    const Vec2 across = std::sqrt(random.Uniform()) * (p.head<2>() - Vec2(500, -20));
+    filled.emplace_back(across.x(), across.y(), p.z());
+  }
+  EXPECT_THAT(WordsOf({.positions = ball}, AutoParameters{}), HasSubstr("fold over"));
+  EXPECT_NE(Parametrise(filled).source, ParameterSource::kCylinder);  // the fit refuses it later
 }
 
 TEST(Parametrise, ABallIsNoTube) {

@@ -225,7 +225,6 @@ TEST(PointFit, ContradictingOptionsAreFaultsOfTheFile) {
               HasSubstr("fit.terms: the auto plan always weighs a 'smoothness'; add"));
   EXPECT_THAT(read("fit: {terms: [points, points, {type: smoothness, weight: auto}]}\n"),
               HasSubstr("fit.terms[1]: the auto plan weighs one 'points'"));
-  EXPECT_THAT(read("parameters: cylinder\n"), HasSubstr("closure: parameters on a cylinder"));
   EXPECT_THAT(read("closure: periodic_uv\n"), HasSubstr("periodic_uv"));
   EXPECT_THAT(read("parameters: torus\nclosure: periodic_u\n"), HasSubstr("torus"));
   EXPECT_THAT(read("parameters: mesh\nclosure: periodic_u\n"),
