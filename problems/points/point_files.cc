@@ -538,6 +538,17 @@ std::size_t PointsExpected(const std::filesystem::path& path, std::string_view l
                                                           static_cast<double>(lines.size()));
 }
 
+// A text that was cut in its last row loses digits of a number without becoming wrong. Programs end
+// the last line, too.
+void NoteMissingEnd(std::string_view text, PointTable& table) {
+  if (!text.empty() && text.back() != '\n' && text.back() != '\r') {
+    table.notes.push_back(fmt::format(
+        "the last line has no end, as in a file that was cut: compare its {} points, and the last "
+        "number, with the original",
+        table.positions.size()));
+  }
+}
+
 // Reads a plain table block by block; returns nothing if the file cannot be read or is not plain.
 std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
                                       std::span<const std::string> attributes) {
@@ -547,11 +558,13 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
   std::size_t kept = 0;  // bytes of an unfinished line from the last block
   Sha256 sha;
   std::optional<PlainPoints> points;
+  char last = '\n';
   while (stream) {
     text.resize(std::max(text.size(), kept + kBlock));
     stream.read(text.data() + kept, kBlock);
     const std::string_view all(text.data(), kept + static_cast<std::size_t>(stream.gcount()));
     sha.Add(all.substr(kept));
+    last = all.empty() ? last : all.back();
     std::size_t begin = 0;
     if (!points) {
       begin = all.find('\n') + 1;
@@ -573,7 +586,9 @@ std::optional<PointFile> ReadPlainCsv(const std::filesystem::path& path,
   if (!points || points->size() == 0) {
     return std::nullopt;
   }
-  return PointFile{.points = points->Take(), .sha256 = sha.Hex()};
+  PointFile file{.points = points->Take(), .sha256 = sha.Hex()};
+  NoteMissingEnd({&last, 1}, file.points);
+  return file;
 }
 
 // Refuses coordinates so large that squares of distances overflow.
@@ -622,7 +637,12 @@ PointFile ReadAnyPointFile(const std::filesystem::path& path,
   } else if (piped) {
     bytes = PipedText(std::move(bytes));
   }
-  file.points = Parse(bytes, zipped ? path.parent_path() / path.stem() : path, attributes);
+  const std::filesystem::path inner = zipped ? path.parent_path() / path.stem() : path;
+  file.points = Parse(bytes, inner, attributes);
+  const std::string ending = LowerCase(inner.extension().string());
+  if (piped || IsCsv(inner) || ending == ".xyz" || ending == ".pts") {
+    NoteMissingEnd(bytes, file.points);
+  }
   return file;
 }
 

@@ -168,6 +168,22 @@ TEST_F(PointFiles, FilesWithoutNamesHaveTheirCoordinatesFirst) {
   EXPECT_THAT(Refusal("h.asc", grid + "5\n"), HasSubstr("ncols"));
 }
 
+// A row that lost its last digits is a row all the same.
+TEST_F(PointFiles, ATextThatWasCutInItsLastLineIsNoted) {
+  const auto is_noted = [&](const std::string& file) {
+    return ::testing::PrintToString(ReadPointFile(folder_ / file, {}).points.notes)
+               .find("the last line has no end") != std::string::npos;
+  };
+  const std::string bare = Lines([](const Vec3& p, const Vec2&) { return Numbers(p, " "); });
+  for (const auto& [file, text] :
+       {std::pair("a.csv", Csv()), std::pair("a.txt", bare), std::pair("a.xyz", bare)}) {
+    WriteFileAtomically(folder_ / file, text);
+    EXPECT_FALSE(is_noted(file)) << file;
+    WriteFileAtomically(folder_ / file, text.substr(0, text.size() - 3));
+    EXPECT_TRUE(is_noted(file)) << file;
+  }
+}
+
 TEST_F(PointFiles, ACompressedFileGivesTheSamePoints) {
   for (const auto& [name, bytes] : std::map<std::string, std::string>{
            {"a.csv", Csv()}, {"a.npy", Npy(5)}, {"a.ply", PlainPly()}, {"a.xyz", Xyz()}}) {
