@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
+#include <optional>
 #include <utility>
 
 #include "fitting/least_squares/sparse_factor.h"
@@ -14,6 +16,22 @@
 #include "surfaces/base/error.h"
 
 namespace semblance::fitting {
+
+HSplineSurface EmptyLike(const HSplineSurface& surface) {
+  HSplineShape shape = surface.shape();
+  shape.reference = OffsetReference::kWorld;
+  const ControlNet net{
+      shape.Columns(0), shape.Rows(0),
+      std::vector<Vec3>(static_cast<std::size_t>(shape.Columns(0)) * shape.Rows(0), Vec3::Zero())};
+  std::map<VertexId, std::optional<Vec3>> offsets;
+  for (const auto& [vertex, offset] : surface.Offsets()) {
+    offsets.emplace_hint(offsets.end(), vertex, Vec3(Vec3::Zero()));
+  }
+  HSplineSurface empty(shape, net);
+  empty.SetOffsets(offsets);
+  return empty;
+}
+
 namespace {
 
 std::vector<Observation> UsedPoints(const AttributeColumns& points,

@@ -7,11 +7,22 @@
 #include <span>
 #include <vector>
 
-#include "fitting/solve/attribute_fit.h"
 #include "surfaces/base/geometry.h"
 #include "surfaces/hspline/hspline_surface.h"
 
 namespace semblance::fitting {
+
+// Points of a fit, with attributes as columns. The referenced arrays must outlive it.
+struct AttributeColumns {
+  std::span<const Vec2> uv;                      // in [0,1] x [0,1]
+  std::span<const double> weights = {};          // > 0, one per point; empty: all 1
+  std::vector<std::span<const double>> columns;  // each with one number per point
+
+  double Weight(std::size_t k) const { return weights.empty() ? 1 : weights[k]; }
+};
+
+// A surface with the same vertices and edited offsets, all of them zero, and offsets in world axes.
+HSplineSurface EmptyLike(const HSplineSurface& surface);
 
 // The parameters of the fit.
 struct SigmaOptions {

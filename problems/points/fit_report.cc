@@ -212,7 +212,8 @@ Json AttributesJson(const PointFit& result) {
     json.push_back({{"name", result.attributes[k].name},
                     {"rms", column.rms},
                     {"weight", column.weight},
-                    {"degrees_of_freedom", column.degrees_of_freedom}});
+                    {"degrees_of_freedom", column.degrees_of_freedom},
+                    {"vertices", column.vertices}});
   }
   return json;
 }
@@ -308,7 +309,7 @@ void WriteResiduals(ResidualFile kind, const PointFit& result, OutputFolder& fol
   }
 }
 
-// Each file holds three attributes, as x, y and z.
+// Each file holds one attribute, as x.
 void WriteAttributes(const PointFit& result, OutputFolder& folder) {
   for (std::size_t k = 0; k < result.attribute_fit.surfaces.size(); ++k) {
     folder.Write(fmt::format("attributes_{}.hspline.json", k + 1),
@@ -336,8 +337,9 @@ std::vector<std::string> TerminalNotes(const PointFitOptions& options, const Poi
     notes.push_back(MovesText(*result.moves, result.unit));
   }
   for (std::size_t k = 0; k < result.attributes.size(); ++k) {
-    notes.push_back(fmt::format("{}: RMS {:.4g}", result.attributes[k].name,
-                                result.attribute_fit.columns[k].rms));
+    const AttributeColumn& column = result.attribute_fit.columns[k];
+    notes.push_back(fmt::format("{}: RMS {:.4g}, {} control vertices", result.attributes[k].name,
+                                column.rms, column.vertices));
   }
   if (std::isfinite(result.sigma_factor)) {
     notes.push_back(

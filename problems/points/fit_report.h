@@ -39,7 +39,7 @@ inline constexpr std::array<FileMark, 4> kPointFitMarks = {
     FileMark{R"(report\.html)", "An H-spline surface through"}};
 
 // Writes resolved.yaml, result.json, residuals.csv or .ply (in the order of the table),
-// surface.hspline.json, surface.ply, attributes_1.hspline.json and so on (three attributes each),
+// surface.hspline.json, surface.ply, attributes_1.hspline.json and so on (one per attribute),
 // report.html and timing.json. The same input gives the same bytes, except in timing.json. Returns
 // lines for the terminal.
 std::vector<std::string> WritePointFit(const PointFitOptions& options, const PointSource& source,

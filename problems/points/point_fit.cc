@@ -74,24 +74,25 @@ std::vector<std::uint32_t> PointsLeftOut(const std::optional<AutoReport>& report
 }
 
 AttributeFit AttributesOver(const PointFit& result, std::span<const double> weights,
-                            const RunContext& context) {
+                            const SchedulePlan& plan, const RunContext& context) {
   std::vector<std::span<const double>> values;
   for (const PointAttribute& attribute : result.attributes) {
     values.emplace_back(attribute.values);
   }
-  return FitAttributes(result.fit.surface,
-                       {.uv = result.fit.uv, .weights = weights, .columns = values},
-                       PointsLeftOut(result.fit.automatic), context.threads);
+  return FitAttributes(
+      result.fit.surface, {.uv = result.fit.uv, .weights = weights, .columns = values},
+      PointsLeftOut(result.fit.automatic),
+      std::holds_alternative<AutoPlan>(plan) ? std::get<AutoPlan>(plan) : AutoPlan{}, context);
 }
 
-void AddAttributes(std::span<const double> weights, const RunContext& context, StepClock& step,
-                   PointFit& result) {
+void AddAttributes(std::span<const double> weights, const SchedulePlan& plan,
+                   const RunContext& context, StepClock& step, PointFit& result) {
   if (!result.Faults().empty()) {
     result.attributes.clear();
   }
   if (!result.attributes.empty()) {
     result.attribute_fit =
-        step("attributes", [&] { return AttributesOver(result, weights, context); });
+        step("attributes", [&] { return AttributesOver(result, weights, plan, context); });
     result.attribute_at = result.attribute_fit.At(result.fit.uv, context.threads);
   }
 }
@@ -195,7 +196,7 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   PointFit result =
       BeginResult(std::move(placed), std::move(fit), std::move(attributes), options.unit);
   CompareShapes(given, result);
-  AddAttributes(given.weights, context, step, result);
+  AddAttributes(given.weights, options.fit.plan, context, step, result);
   if (factor != 1) {
     ScaleHeights(1 / factor, result.fit);
   }

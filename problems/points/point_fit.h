@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "fitting/plan/attribute_fit.h"
 #include "fitting/plan/fit_result.h"
 #include "fitting/relaxation/foot_moves.h"
-#include "fitting/solve/attribute_fit.h"
 #include "fitting/solve/surface_sigma.h"
 #include "problems/experiment/step_clock.h"
 #include "problems/points/fit_maps.h"

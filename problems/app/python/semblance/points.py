@@ -69,8 +69,7 @@ class PointFit:
         names = list(self.attributes)
         if name not in names:
             raise InputError(f"there is no attribute '{name}'; the fit has {names}")
-        surface, axis = divmod(names.index(name), 3)
-        return self._attribute_surfaces[surface].points(uv)[:, axis]
+        return self._attribute_surfaces[names.index(name)].points(uv)[:, 0]
 
     def predict(self, xy, level: float = 0.9, threads: int = 1) -> dict:
         """Predict heights at n x 2 places, for a fit of heights over x and y by plan: auto.
