@@ -92,10 +92,11 @@ ColumnScale ComputeScale(std::span<const double> values, const Base& base, doubl
   return {.mean = mean, .factor = sd > 0 ? kSpread * length_mm / sd : 1};
 }
 
-// What was fitted less the start, whose x is then the value. An offset counts from the point of the
-// coarser surface, and not from the refined vertex, so that the start has a part in it.
-HSplineSurface ValuesOf(const HSplineSurface& fitted, const HSplineSurface& start,
-                        const ColumnScale& scale) {
+// Returns the fitted surface less the start: its x is then the value. An offset counts from the
+// point of the coarser surface, and not from the refined vertex, so that the start has a part in
+// it.
+HSplineSurface DifferenceFromStart(const HSplineSurface& fitted, const HSplineSurface& start,
+                                   const ColumnScale& scale) {
   ControlNet net = fitted.Net(0), rest = start.Net(0);
   for (std::size_t k = 0; k < net.vertices.size(); ++k) {
     const double moved = net.vertices[k].x() - rest.vertices[k].x();
@@ -114,6 +115,23 @@ HSplineSurface ValuesOf(const HSplineSurface& fitted, const HSplineSurface& star
     values.SetOffsets(offsets);
   }
   return values;
+}
+
+// Fits one column, and adds it to the fit.
+void AddColumn(std::span<const double> values, const HSplineSurface& start, const Base& base,
+               const AutoPlan& plan, const RunContext& context, AttributeFit& fit) {
+  const ColumnScale scale = ComputeScale(values, base, MeanLengths(start).maxCoeff());
+  std::vector<Vec3> moved = base.on_start;
+  for (std::size_t n = 0; n < moved.size(); ++n) {
+    moved[n].x() += scale.factor * (values[base.used[n]] - scale.mean);
+  }
+  const NestedFitResult found = FitNested(start, {moved, base.uv, base.weights}, plan, context);
+  const AutoReport& report = found.report;
+  const NestedRound& round = report.rounds[static_cast<std::size_t>(report.chosen_round)];
+  fit.surfaces.push_back(DifferenceFromStart(found.surface, start, scale));
+  fit.columns.push_back({.weight = report.weight,
+                         .degrees_of_freedom = round.degrees_of_freedom,
+                         .vertices = round.vertices});
 }
 
 double Misfit(std::span<const double> values, std::span<const double> fitted,
@@ -146,21 +164,9 @@ AttributeFit FitAttributes(const HSplineSurface& surface, const AttributeColumns
   CheckColumns(points);
   const HSplineSurface start = StartOver(surface, plan);
   const Base base = MakeBase(start, points, AllBut(left_out, points.uv.size()), context.threads);
-  const double length_mm = MeanLengths(start).maxCoeff();
   AttributeFit fit;
   for (const std::span<const double>& values : points.columns) {
-    const ColumnScale scale = ComputeScale(values, base, length_mm);
-    std::vector<Vec3> moved = base.on_start;
-    for (std::size_t n = 0; n < moved.size(); ++n) {
-      moved[n].x() += scale.factor * (values[base.used[n]] - scale.mean);
-    }
-    const NestedFitResult found = FitNested(start, {moved, base.uv, base.weights}, plan, context);
-    fit.surfaces.push_back(ValuesOf(found.surface, start, scale));
-    const NestedRound& round =
-        found.report.rounds[static_cast<std::size_t>(found.report.chosen_round)];
-    fit.columns.push_back({.weight = found.report.weight,
-                           .degrees_of_freedom = round.degrees_of_freedom,
-                           .vertices = round.vertices});
+    AddColumn(values, start, base, plan, context, fit);
   }
   const std::vector<std::vector<double>> fitted = fit.At(points.uv, context.threads);
   for (std::size_t c = 0; c < fitted.size(); ++c) {
