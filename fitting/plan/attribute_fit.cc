@@ -33,6 +33,16 @@ void CheckColumns(const AttributeColumns& points) {
   }
 }
 
+void CheckCount(std::size_t points) {
+  constexpr std::size_t kFewest = 16;  // of the auto plan
+  if (points < kFewest) {
+    throw InputError(fmt::format(
+        "attributes: {} points are too few for a fit of their own; give at least {}, or leave "
+        "`attributes` out",
+        points, kFewest));
+  }
+}
+
 std::vector<std::uint32_t> AllBut(std::span<const std::uint32_t> left_out, std::size_t count) {
   std::vector<std::uint32_t> used;
   for (std::uint32_t k = 0; k < count; ++k) {
@@ -164,6 +174,7 @@ AttributeFit FitAttributes(const HSplineSurface& surface, const AttributeColumns
   CheckColumns(points);
   const HSplineSurface start = StartOver(surface, plan);
   const Base base = MakeBase(start, points, AllBut(left_out, points.uv.size()), context.threads);
+  CheckCount(base.used.size());
   AttributeFit fit;
   for (const std::span<const double>& values : points.columns) {
     AddColumn(values, start, base, plan, context, fit);

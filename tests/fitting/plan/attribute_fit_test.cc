@@ -127,6 +127,15 @@ TEST(AttributeFit, PointsThatAreLeftOutDoNotCount) {
   EXPECT_LT(fit.columns[2].rms, 0.05);
 }
 
+TEST(AttributeFit, FewPointsAreRefused) {
+  Coloured head = ColouredHead(2, 0);
+  head.uv.resize(15);
+  for (std::vector<double>& column : head.values) {
+    column.resize(15);
+  }
+  EXPECT_THROW(FitAttributes(head.surface, head.Columns(), {}, {}, {}), InputError);
+}
+
 TEST(AttributeFit, WrongColumnsAreRefused) {
   Coloured head = ColouredHead(2, 0);
   head.values[1].pop_back();
