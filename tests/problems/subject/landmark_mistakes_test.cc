@@ -262,7 +262,8 @@ TEST(LandmarkMistakes, DepthsInRowsOfOneSideThatWereShiftedAreNoted) {
 
 // Also at a site without a published depth, and for a depth that is too small.
 TEST(LandmarkMistakes, OneDepthInAnotherUnitIsNoted) {
-  for (const auto& [site, factor] : {std::pair("fe_l", 10.0), std::pair("zy_r", 0.1)}) {
+  for (const auto& [site, factor] : {std::pair("fe_l", 10.0), std::pair("zy_r", 0.1),
+                                     std::pair("fe_l", 25.4), std::pair("go_l", 0.001)}) {
     Subject subject = RealSubject("vhm");
     auto& landmarks = subject.file.landmarks;
     const auto wrong = std::ranges::find(landmarks, site, &Landmark::site);
