@@ -30,8 +30,8 @@ InputMistakes Find(const Subject& s) {
   return FindLandmarkMistakes(s.file, s.skull, MeshQuery(s.skull), PlaceOptions{});
 }
 
-Subject PhantomSubject() {
-  const Phantom phantom = MakePhantom({.rings = 40});
+Subject PhantomSubject(std::uint64_t random_seed = 1) {
+  const Phantom phantom = MakePhantom({.random_seed = random_seed, .rings = 40});
   Subject subject{.file = {}, .skull = phantom.skull};
   subject.file.subject = "P";
   for (const PhantomSite& s : phantom.sites) {
@@ -357,6 +357,15 @@ TEST(LandmarkMistakes, SitesThatAreAllOffTheBoneAreNoted) {
   MoveSites(s, [&](const Vec3& p) { return Vec3(p + 2 * (middle - p).normalized()); });
   EXPECT_THAT(Find(s).errors, IsEmpty());
   EXPECT_THAT(Find(s).notes, ElementsAre(HasSubstr("half of the sites lie ")));
+}
+
+TEST(LandmarkMistakes, LandmarksOfAnotherSkullOfMuchTheSameShapeAreNoted) {
+  for (std::uint64_t seed = 1; seed <= 40; ++seed) {
+    Subject s = PhantomSubject(seed);
+    s.file = PhantomSubject(seed + 1).file;
+    const InputMistakes found = Find(s);
+    EXPECT_GE(found.notes.size() + found.errors.size(), 1u) << seed;
+  }
 }
 
 TEST(LandmarkMistakes, AnOpenMandibleIsReportedOnceWithItsAngle) {
