@@ -235,15 +235,15 @@ void CheckReference(const Experiment& experiment, std::vector<OptionFault>& faul
   if (reference == nullptr) {
     return;
   }
-  if (reference->landmarks.empty()) {
+  const bool own_skin = std::holds_alternative<FileTemplate>(experiment.face_template);
+  if (own_skin && reference->landmarks.empty()) {
     faults.push_back({"face.landmarks",
                       "no file is named; give the landmarks of the skull under the template's "
                       "skin"});
-  }
-  if (!std::holds_alternative<FileTemplate>(experiment.face_template)) {
+  } else if (!own_skin && !reference->landmarks.empty()) {
     faults.push_back({"face",
-                      "`reference` takes a reference head's own skin as the template; make it by "
-                      "`semblance template` and name it by `template: {type: file, ...}`"});
+                      "`reference` with landmarks takes that head's own skin as the template; make "
+                      "it by `semblance template` and name it by `template: {type: file, ...}`"});
   }
 }
 

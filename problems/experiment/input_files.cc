@@ -250,7 +250,8 @@ CheckFindings InputCheck::CheckFace(const Experiment& experiment) {
       Try(found, [&] { LoadBust(experiment.bust, experiment.face_template, context_); });
       const TemplateFace generic = LoadTemplate(experiment.face_template);
       LoadExperimentPrior(experiment, generic, loaded_, context_);
-      if (const auto* const reference = std::get_if<ReferenceFace>(&experiment.face)) {
+      if (const auto* const reference = std::get_if<ReferenceFace>(&experiment.face);
+          reference != nullptr && !reference->landmarks.empty()) {
         ReadLandmarks(reference->landmarks);
       }
     }));

@@ -12,6 +12,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "interp/schemes/people.h"
 #include "problems/experiment/dowel_projection.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/face_parts.h"
@@ -162,11 +163,39 @@ FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInp
 // Bending
 // ---------------------------------------------------------------------------------------------
 
+void CheckEnough(const PointPairs& pairs, const std::string& reference) {
+  constexpr std::size_t kFewestLandmarks = 4;  // a thin plate needs as many
+  if (pairs.from.size() < kFewestLandmarks) {
+    throw InputError(
+        fmt::format("{}: it shares {} landmarks with the subject, and from skull to skull at least "
+                    "{} are needed",
+                    reference, pairs.from.size(), kFewestLandmarks));
+  }
+}
+
+// The landmarks that the subject shares with the mean person, whose skull lies people's mean depth
+// below the template.
+PointPairs FromMeanPerson(const PlacedTemplate& placed,
+                          const std::map<std::string, Vec3>& subject) {
+  PointPairs pairs;
+  for (const auto& [site, point] : interp::CarriedPeople().sites) {
+    const auto uv = placed.face.site_uv.find(site);
+    const auto same = subject.find(site);
+    if (uv != placed.face.site_uv.end() && same != subject.end()) {
+      const double depth_mm = placed.face_from_template.scale * std::exp(point.depth.mean);
+      const SurfaceFrame skin = placed.face.surface.Frame(uv->second);
+      pairs.from.push_back(skin.point - depth_mm * skin.Normal());
+      pairs.to.push_back(same->second);
+    }
+  }
+  CheckEnough(pairs, "the mean person");
+  return pairs;
+}
+
 // The landmarks that both skulls have.
 PointPairs FromSkullToSkull(const std::filesystem::path& reference,
                             const Similarity& face_from_template,
                             const std::map<std::string, Vec3>& subject) {
-  constexpr std::size_t kFewestLandmarks = 4;  // a thin plate needs as many
   PointPairs pairs;
   for (const Landmark& landmark : InLpsMm(ReadLandmarks(reference).file).landmarks) {
     if (const auto same = subject.find(landmark.site); same != subject.end()) {
@@ -175,12 +204,7 @@ PointPairs FromSkullToSkull(const std::filesystem::path& reference,
       pairs.to.push_back(same->second);
     }
   }
-  if (pairs.from.size() < kFewestLandmarks) {
-    throw InputError(
-        fmt::format("{}: it shares {} landmarks with the subject, and from skull to skull at least "
-                    "{} are needed",
-                    reference.string(), pairs.from.size(), kFewestLandmarks));
-  }
+  CheckEnough(pairs, reference.string());
   return pairs;
 }
 
@@ -207,8 +231,10 @@ MadeFace MakeFace(const ThinPlateFace& o, PlacedTemplate placed, const FaceInput
 
 MadeFace MakeFace(const ReferenceFace& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext&) {
+  const std::map<std::string, Vec3>& subject = in.subject.points;
   const PointPairs pairs =
-      FromSkullToSkull(o.landmarks, placed.face_from_template, in.subject.points);
+      o.landmarks.empty() ? FromMeanPerson(placed, subject)
+                          : FromSkullToSkull(o.landmarks, placed.face_from_template, subject);
   FaceFit unfitted =
       Unfitted(UnderThinPlate(placed.face.surface, pairs, o.stiffness_mm), placed.dowels);
   return {std::move(placed), std::move(unfitted), {}};

@@ -47,7 +47,8 @@ void Fields(Visitor& visit, ThinPlateFace& o) {
 
 // The template is the skin of a reference head. The thin plate that brings the landmarks of that
 // head's skull to the subject's bends it (thesis 5.3, volumetric deformation). Depths do not
-// matter.
+// matter. Without landmarks the reference is the mean person: the skull lies people's mean depth
+// (interp::CarriedPeople) below the template.
 struct ReferenceFace {
   static constexpr std::string_view kName = "reference";
   std::filesystem::path landmarks;
@@ -58,7 +59,8 @@ void Fields(Visitor& visit, ReferenceFace& o) {
   visit(FieldInfo{.name = "landmarks",
                   .doc = "landmarks on the skull of the head that `template: {type: file, ...}` "
                          "was made from, in the frame of that head; those that the subject has "
-                         "too are used"},
+                         "too are used. Without a file the template is the mean person's face, "
+                         "and the sites of that skull lie below it by the mean depth of 54 people"},
         o.landmarks);
   visit(FieldInfo{.name = "stiffness_mm",
                   .unit = "mm",

@@ -15,6 +15,7 @@
 #include <numbers>
 
 #include "fitting/terms/metric_distortion.h"
+#include "interp/schemes/people.h"
 #include "problems/experiment/experiment_config.h"
 #include "problems/experiment/input_files.h"
 #include "problems/experiment/stage_cache.h"
@@ -138,9 +139,40 @@ TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjects) {
 }
 
 TEST(Run, AReferenceNamesItsLandmarksAndItsSkin) {
-  EXPECT_THAT(WordsOf<ConfigError>([] { SmallPhantom({"face=reference"}); }),
-              AllOf(HasSubstr("face.landmarks: no file is named"),
-                    HasSubstr("takes a reference head's own skin")));
+  EXPECT_THAT(WordsOf<ConfigError>([] { SmallPhantom({TemplateOfIctFiles(), "face=reference"}); }),
+              HasSubstr("face.landmarks: no file is named"));
+  EXPECT_THAT(WordsOf<ConfigError>([] {
+                SmallPhantom({"face={type: reference, landmarks: skull.csv}"});
+              }),
+              HasSubstr("takes that head's own skin"));
+}
+
+// The sites of the skull that lies people's mean depth below the face of the model.
+std::string SkullOfMeanPerson() {
+  const TemplateFace face = LoadTemplate(IctTemplate{.mean = IctMean::kModel});
+  std::string csv = "site,x,y,z\n";
+  const auto& people = interp::CarriedPeople().sites;
+  for (const auto& [site, uv] : face.site_uv) {
+    const SurfaceFrame skin = face.surface.Frame(uv);
+    const Vec3 p = skin.point - std::exp(people.at(site).depth.mean) * skin.Normal();
+    csv += fmt::format("{},{},{},{}\n", site, p.x(), p.y(), p.z());
+  }
+  return csv;
+}
+
+TEST(Run, WithoutLandmarksTheReferenceIsTheMeanPerson) {
+  const testing::ScratchFolder folder;
+  WriteFileAtomically(folder.Path() / "skull.csv", SkullOfMeanPerson());
+  const RunResult by_file = problems::Run(
+      SmallPhantom(
+          {TemplateOfIctFiles(), fmt::format("face={{type: reference, landmarks: {}/skull.csv}}",
+                                             folder.Path().string())}),
+      {});
+  const RunResult carried =
+      problems::Run(SmallPhantom({"template={type: ict, mean: model}", "face=reference"}), {});
+  for (const Vec2& uv : {Vec2(0.5, 0.5), Vec2(0.3, 0.7), Vec2(0.8, 0.2)}) {
+    EXPECT_LT((carried.fit.surface.Point(uv) - by_file.fit.surface.Point(uv)).norm(), 1e-3);
+  }
 }
 
 TEST(Run, AScoreOverASmallPartOfTheFaceIsNoted) {
