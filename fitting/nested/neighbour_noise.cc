@@ -42,9 +42,11 @@ class Neighbourhood {
   std::span<const std::uint32_t> indices_;
 };
 
-// The squared residual of a weighted polynomial fit per degree of freedom and channel.
+enum class Weighing { kByWeight, kEqual };
+
+// The squared residual of a polynomial fit per degree of freedom and channel.
 double ResidualVariance(const NestedPoints& points, const std::vector<std::uint32_t>& near,
-                        int terms) {
+                        int terms, Weighing weighing) {
   const auto count = static_cast<Eigen::Index>(near.size());
   Eigen::MatrixXd rows(count, terms), values(count, points.channels);
   double scale = 1e-300;
@@ -57,7 +59,7 @@ double ResidualVariance(const NestedPoints& points, const std::vector<std::uint3
     const double x = (points.X(k) - points.X(near[0])) / scale,
                  y = (points.Y(k) - points.Y(near[0])) / scale;
     const std::array<double, 6> row = {1, x, y, x * x, x * y, y * y};
-    const double scale_of_k = points.Scale(k);
+    const double scale_of_k = weighing == Weighing::kByWeight ? points.Scale(k) : 1;
     rows.row(r) = scale_of_k * Eigen::Map<const Eigen::RowVectorXd>(row.data(), terms);
     for (int c = 0; c < points.channels; ++c) {
       values(r, c) = scale_of_k * points.value[k][c];
@@ -67,10 +69,8 @@ double ResidualVariance(const NestedPoints& points, const std::vector<std::uint3
   return left.squaredNorm() / static_cast<double>((count - terms) * points.channels);
 }
 
-}  // namespace
-
-double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
-                      NeighbourModel model) {
+double Noise(const NestedPoints& points, std::span<const std::uint32_t> indices,
+             NeighbourModel model, Weighing weighing) {
   constexpr std::size_t kSamples = 1000;  // the median's error is then about 3 %; bounds the time
   const std::size_t count = model == NeighbourModel::kPlaneOf8 ? 8 : 20;
   const int terms = model == NeighbourModel::kPlaneOf8 ? 3 : 6;
@@ -81,11 +81,45 @@ double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t>
   std::vector<double> squares;
   for (std::size_t n = 0; n < indices.size();
        n += std::max<std::size_t>(indices.size() / kSamples, 1)) {
-    squares.push_back(ResidualVariance(points, neighbourhood.Of(n, count), terms));
+    squares.push_back(ResidualVariance(points, neighbourhood.Of(n, count), terms, weighing));
   }
   // The median of a chi-squared variable divided by its mean (Wilson & Hilferty 1931).
   const double freedom = static_cast<double>(count + 1 - terms) * points.channels;
   return std::sqrt(UpperMedian(squares) / std::pow(1 - 2 / (9 * freedom), 3));
+}
+
+double WeightQuantile(const NestedPoints& points, std::span<const std::uint32_t> indices,
+                      double share) {
+  std::vector<double> weights;
+  for (const std::uint32_t k : indices) {
+    weights.push_back(points.Weight(k));
+  }
+  return weights.empty() ? kNaN : Quantile(weights, share);
+}
+
+}  // namespace
+
+double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
+                      NeighbourModel model) {
+  return Noise(points, indices, model, Weighing::kByWeight);
+}
+
+NoiseByWeight CompareNoiseByWeight(const NestedPoints& points,
+                                   std::span<const std::uint32_t> indices) {
+  constexpr double kOuter = 0.05;  // a few extreme weights do not move the middle
+  const double middle = std::sqrt(WeightQuantile(points, indices, kOuter) *
+                                  WeightQuantile(points, indices, 1 - kOuter));
+  std::vector<std::uint32_t> light, heavy;  // in the order along the curve
+  for (const std::uint32_t k : indices) {
+    (points.Weight(k) < middle ? light : heavy).push_back(k);
+  }
+  const auto noise = [&points](const std::vector<std::uint32_t>& half) {
+    return Noise(points, half, NeighbourModel::kPlaneOf8, Weighing::kEqual);
+  };
+  return {.light_mm = noise(light),
+          .heavy_mm = noise(heavy),
+          .light_weight = WeightQuantile(points, light, 0.5),
+          .heavy_weight = WeightQuantile(points, heavy, 0.5)};
 }
 
 void PairCorrelation::Add(const NestedResidual& a, const NestedResidual& b) {

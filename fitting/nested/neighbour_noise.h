@@ -6,6 +6,7 @@
 #include <span>
 
 #include "fitting/nested/leaf_sums.h"
+#include "fitting/nested/nested_fit.h"
 
 namespace semblance::fitting {
 
@@ -17,6 +18,9 @@ enum class NeighbourModel { kPlaneOf8, kQuadraticOf20 };
 // follow counts as noise, and more so in wider neighbourhoods. Returns NaN for too few points.
 double NeighbourNoise(const NestedPoints& points, std::span<const std::uint32_t> indices,
                       NeighbourModel model);
+
+NoiseByWeight CompareNoiseByWeight(const NestedPoints& points,
+                                   std::span<const std::uint32_t> indices);
 
 // The correlation of pairs of residuals: the sum of e_a . e_b divided by that of (|e_a|^2 +
 // |e_b|^2) / 2, where each residual is multiplied by its point's Scale. Its expectation is 0 for

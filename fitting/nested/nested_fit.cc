@@ -39,7 +39,8 @@
 //   6. weight_, metric_ and least_gain_ are the results of the last search, and the start of the
 //      next one.
 //   7. every_ does not grow from round to round, because the number of vertices does not fall.
-//   8. All sums are in the order of the curve, so the given order of the points has no effect.
+//   8. All sums are in the order of the curve, so the given order of the points has no effect, but
+//      that of near copies the one given first is the original.
 #include "fitting/nested/nested_fit.h"
 #include "fitting/nested/nested_points.h"
 
@@ -822,6 +823,9 @@ class NestedFitter {
     report_.outliers_together = StandTogether(outlier_);
     report_.neighbour_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kQuadraticOf20);
     report_.closer_noise_mm = NeighbourNoise(points_, kept, NeighbourModel::kPlaneOf8);
+    if (points_.weighted) {
+      report_.by_weight = CompareNoiseByWeight(points_, kept);
+    }
     for (std::uint32_t k = 0; k < points_.size(); ++k) {
       if (outlier_[k] != 0) {
         report_.outliers.push_back(points_.given[k]);
@@ -834,6 +838,7 @@ class NestedFitter {
   // Reports copies. A copy of an outlier is an outlier too.
   void ReportRepeated() {
     std::vector<std::uint32_t> copies;
+    report_.measured_twice = points_.measured_twice;
     for (const RepeatedPoint& copy : points_.repeated) {
       report_.repeated.push_back(copy.given);
       report_.near_copies += copy.is_exact ? 0 : 1;

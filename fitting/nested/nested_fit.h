@@ -30,6 +30,14 @@ struct NestedRound {
   int outliers = -1;
 };
 
+// The noise of the lighter and of the heavier ones of weighted points, each with their median
+// weight. The weights themselves take no part in the noise: where they are right, the heavier
+// points have less of it. NaN where either are too few.
+struct NoiseByWeight {
+  double light_mm = kNaN, heavy_mm = kNaN;          // by planes through 8 neighbours among them
+  double light_weight = kNaN, heavy_weight = kNaN;  // > 0
+};
+
 // The assumptions of the fit, and measures of their validity. For points with weights, noise and
 // held-out errors refer to an inlier of mean weight: errors are multiplied by sqrt(weight / mean
 // weight), where the mean is over the points that are not outliers.
@@ -43,6 +51,7 @@ struct AutoReport {
   double noise_mm = kNaN;               // standard deviation of a point along one axis, by the fit
   double neighbour_noise_mm = kNaN;     // the same, by quadratics through 20 neighbours
   double closer_noise_mm = kNaN;        // by planes through 8; smaller if detail passes for noise
+  NoiseByWeight by_weight;              // of weighted points
   double held_out_rms_mm = kNaN;        // along one axis, of the tenth that was held out
   double neighbour_correlation = kNaN;  // of residuals of consecutive points on the curve
   double effective_share = 1;           // independent points per point, by correlated residuals
@@ -55,6 +64,7 @@ struct AutoReport {
   std::vector<std::uint32_t> outliers;  // given indices, ascending; these points have no weight
   std::vector<std::uint32_t> repeated;  // given indices of copies, ascending; copies count once
   int near_copies = 0;                  // copies among them that were moved a little
+  int measured_twice = 0;               // points at the places of others that are no copies
 };
 
 struct NestedFitResult {

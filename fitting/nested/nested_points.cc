@@ -188,6 +188,19 @@ class BlockRanges {
   std::vector<Range> ranges_;
 };
 
+// Makes the point of each group that was given first the original, since a second export follows
+// the first. `original` has one point per group as the original of all others.
+void TakeFirstGiven(const NestedPoints& points, Originals& original) {
+  Originals first = original;
+  for (std::uint32_t k = 0; k < points.size(); ++k) {
+    std::uint32_t& of_group = first[original[k]];
+    of_group = points.given[k] < points.given[of_group] ? k : of_group;
+  }
+  for (std::uint32_t k = 0; k < points.size(); ++k) {
+    original[k] = first[original[k]];
+  }
+}
+
 // Calls visit(a, b) for points b that lie within reach(a) of point a, in patches of level 0, and
 // behind it along a slanted direction. visit returns whether b is a copy of a; a copy has no copies
 // of its own. The direction is slanted so that few points of a lattice lie at one place along it.
@@ -212,6 +225,7 @@ Originals FindCopies(const NestedPoints& points, const Reach& reach, const Visit
       }
     }
   }
+  TakeFirstGiven(points, original);
   return original;
 }
 
@@ -283,8 +297,13 @@ void SeparateSecondExport(NestedPoints& points) {
   for (std::size_t k = 0; k < points.size(); ++k) {
     copies += original[k] != k ? 1 : 0;
   }
-  if (copies > enough && ShareTheirErrors(points, original)) {
+  if (copies <= enough) {
+    return;
+  }
+  if (ShareTheirErrors(points, original)) {
     SeparateCopies(original, points);
+  } else {
+    points.measured_twice = static_cast<int>(copies - before);
   }
 }
 

@@ -49,6 +49,7 @@ struct NestedPoints {
   std::vector<Vec3> value;              // displacement per channel, mm; 0 beyond the last channel
   std::vector<std::uint32_t> given;     // given index of each point
   std::vector<RepeatedPoint> repeated;  // copies, which are not in the arrays above
+  int measured_twice = 0;  // points at the places of others that are no copies, as all points count
   double lattice_mm =
       0;  // all z are whole multiples of it apart (FindLatticeStep); 0: they are not
   int channels = 0;

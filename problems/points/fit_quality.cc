@@ -175,31 +175,30 @@ std::string ReliefText(const GivenPoints& given, const PointFit& result) {
 }
 
 std::string WeightText(const GivenPoints& given, const FitResult& fit, std::string_view unit) {
-  // Points in each group; the weights must differ by the factor between the groups. True weights
-  // make the distances of heavy points the smaller ones; noise alone turns that into 1.3 at most.
-  constexpr std::size_t kFewest = 100;
+  // True weights make the noise of the heavier half the smaller one, and constant noise makes both
+  // equal; estimates of equal noises differ by 1.3 at most.
   constexpr double kFactor = 4, kRatio = 1.5;
-  const std::vector<double>& weights = given.weights;
-  if (given.has_sigma || weights.size() < 2 * kFewest) {
+  if (!fit.automatic) {
     return "";
   }
-  const auto split = std::ranges::minmax(weights);
-  const double middle = std::sqrt(split.min * split.max);
-  std::vector<double> light, heavy;
-  for (std::uint32_t k = 0; k < weights.size(); ++k) {
-    (weights[k] < middle ? light : heavy).push_back(fit.residual_mm[k]);
-  }
-  if (split.max < kFactor * split.min || light.size() < kFewest || heavy.size() < kFewest) {
+  const NoiseByWeight& noise = fit.automatic->by_weight;
+  if (!(noise.heavy_weight > kFactor * noise.light_weight) ||
+      !(noise.heavy_mm > kRatio * noise.light_mm)) {
     return "";
   }
-  const double light_mm = UpperMedian(light), heavy_mm = UpperMedian(heavy);
-  return heavy_mm > kRatio * light_mm
+  const std::string light = LengthText(noise.light_mm, unit, 3),
+                    heavy = LengthText(noise.heavy_mm, unit, 3);
+  return given.has_sigma
              ? fmt::format(
-                   "points of great weight lie farther from the surface than those of small weight "
-                   "({} and {}, medians), and a great weight means an exact point; if the column "
+                   "points of small sigma have more noise than those of great sigma ({} and {}, "
+                   "between neighbours), and a small sigma means an exact point; if the column "
+                   "holds weights, name it weight",
+                   heavy, light)
+             : fmt::format(
+                   "points of great weight have more noise than those of small weight ({} and {}, "
+                   "between neighbours), and a great weight means an exact point; if the column "
                    "holds standard deviations, name it sigma",
-                   LengthText(heavy_mm, unit, 3), LengthText(light_mm, unit, 3))
-             : "";
+                   heavy, light);
 }
 
 std::vector<std::string> PointFit::Faults() const {
@@ -222,6 +221,17 @@ std::vector<std::string> PointFit::Faults() const {
                     LengthText(fit.point_rms_mm, unit, 3), 100 * off));
   }
   return faults;
+}
+
+std::string TwiceText(const FitResult& fit) {
+  return fit.automatic && fit.automatic->measured_twice > 0
+             ? fmt::format(
+                   "{} points lie nearly at the places of others and differ from them by as much "
+                   "as "
+                   "neighbours do: all count, as points that were measured twice; if they are a "
+                   "rounded or moved export of the others, remove them",
+                   fit.automatic->measured_twice)
+             : "";
 }
 
 }  // namespace semblance::problems

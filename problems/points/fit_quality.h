@@ -40,8 +40,11 @@ std::string TailText(const GivenPoints& given, const FitResult& fit, std::string
 // otherwise.
 std::string ReliefText(const GivenPoints& given, const PointFit& result);
 
-// States that points of great weight lie farther from the surface than those of small weight, as if
-// the weights were standard deviations; empty if they do not, or if a column sigma gave them.
+// States that points of great weight, or small sigma, are the noisier ones, as if weights were
+// standard deviations or the other way round; empty if they are not.
 std::string WeightText(const GivenPoints& given, const FitResult& fit, std::string_view unit);
+
+// States that many points lie at the places of others and count as measured twice; empty otherwise.
+std::string TwiceText(const FitResult& fit);
 
 }  // namespace semblance::problems

@@ -216,8 +216,8 @@ PointFit FitPoints(PointTable table, const PointFitOptions& options, const RunCo
   if (result.fit.automatic) {
     result.fit.automatic->has_long_tail = !tail.empty();
   }
-  for (std::string text :
-       {std::move(tail), WeightText(given, result.fit, options.unit), ReliefText(given, result)}) {
+  for (std::string text : {std::move(tail), WeightText(given, result.fit, options.unit),
+                           ReliefText(given, result), TwiceText(result.fit)}) {
     if (!text.empty()) {
       notes.push_back(std::move(text));
     }

@@ -564,7 +564,7 @@ TEST(PointFit, HeightsAlongASteepPlaneAreNoted) {
 
 // A third of the points has ten times the standard deviation that is stated for the others.
 TEST(PointFit, StandardDeviationsAsWeightsAreNoted) {
-  constexpr char kWords[] = "points of great weight lie farther from the surface";
+  constexpr char kWords[] = "points of great weight have more noise";
   PointTable table = Hills(900, 60, 0.01, 3);
   Random random(7);
   std::vector<double> sigma;
@@ -578,6 +578,47 @@ TEST(PointFit, StandardDeviationsAsWeightsAreNoted) {
   EXPECT_FALSE(HasNote(table, kWords));
   table.weights.assign(sigma.size(), 1);
   EXPECT_FALSE(HasNote(table, kWords));
+}
+
+// Hills(...) has noise of 0.01, and planes through neighbours miss it by 0.05. Copies that were moved by less count once, as the first of two
+// exports; points that differ by more are measurements of their own.
+TEST(PointFit, ASecondExportCountsOnceAndASecondMeasurementIsNoted) {
+  const PointTable once = Hills(900, 60, 0.01, 3);
+  const auto with_twins = [&once](double moved_mm) {
+    PointTable table = once;
+    Random random(9);
+    for (const Vec3& p : once.positions) {
+      table.positions.push_back(p + moved_mm * Vec3(0, 0, random.Normal()));
+    }
+    return table;
+  };
+  const PointFit plain = FitPoints(once, {}, {}), copied = FitPoints(with_twins(1e-4), {}, {});
+  EXPECT_NEAR(copied.fit.automatic->near_copies, 900, 10);  // some points lie close by chance
+  EXPECT_NEAR(copied.fit.automatic->noise_mm, plain.fit.automatic->noise_mm, 0.0005);
+  EXPECT_FALSE(HasNote(with_twins(1e-4), "measured twice"));
+  EXPECT_TRUE(HasNote(with_twins(0.2), "measured twice"));
+}
+
+// The surface follows the points that weigh most, so distances from it would not tell. Weights
+// spread over 100 and more.
+TEST(PointFit, WeightsAndDeviationsThatAreExchangedAreNoted) {
+  for (const double decades : {2.0, 3.0}) {
+    PointTable table = Hills(2000, 60, 0.001, 3);
+    Random random(8);
+    std::vector<double> sigma;
+    for (Vec3& p : table.positions) {
+      sigma.push_back(std::pow(10.0, -decades * random.Uniform()));
+      p.z() += sigma.back() * random.Normal();
+    }
+    const auto squared_inverse = [](double s) { return 1 / (s * s); };
+    table.weights = sigma;
+    EXPECT_TRUE(HasNote(table, "if the column holds standard deviations, name it sigma"));
+    std::ranges::transform(sigma, table.weights.begin(), squared_inverse);
+    EXPECT_FALSE(HasNote(table, "have more noise"));
+    table.weights_of_sigma = true;  // a column sigma that holds 1 / sd^2 has weights of sd^4
+    std::ranges::transform(sigma, table.weights.begin(), [](double s) { return s * s * s * s; });
+    EXPECT_TRUE(HasNote(table, "if the column holds weights, name it weight"));
+  }
 }
 
 // The files of people that gave wrong results without a word: the RMS that is right, and a note.
