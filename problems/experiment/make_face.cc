@@ -232,9 +232,9 @@ MadeFace MakeFace(const ThinPlateFace& o, PlacedTemplate placed, const FaceInput
 MadeFace MakeFace(const ReferenceFace& o, PlacedTemplate placed, const FaceInput& in,
                   const RunContext&) {
   const std::map<std::string, Vec3>& subject = in.subject.points;
-  const PointPairs pairs =
-      o.landmarks.empty() ? FromMeanPerson(placed, subject)
-                          : FromSkullToSkull(o.landmarks, placed.face_from_template, subject);
+  const PointPairs pairs = o.landmarks.empty()
+                               ? FromMeanPerson(placed, subject)
+                               : FromSkullToSkull(o.landmarks, placed.face_from_template, subject);
   FaceFit unfitted =
       Unfitted(UnderThinPlate(placed.face.surface, pairs, o.stiffness_mm), placed.dowels);
   return {std::move(placed), std::move(unfitted), {}};

@@ -75,9 +75,9 @@ void ScaleHeights(double factor, FitResult& fit) {
     return;
   }
   AutoReport& report = *fit.automatic;
-  for (double* const length : {&report.noise_mm, &report.neighbour_noise_mm,
-                               &report.closer_noise_mm, &report.held_out_rms_mm,
-                               &report.by_weight.light_mm, &report.by_weight.heavy_mm}) {
+  for (double* const length :
+       {&report.noise_mm, &report.neighbour_noise_mm, &report.closer_noise_mm,
+        &report.held_out_rms_mm, &report.by_weight.light_mm, &report.by_weight.heavy_mm}) {
     *length *= factor;
   }
   for (NestedRound& round : report.rounds) {

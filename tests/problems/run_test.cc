@@ -139,12 +139,13 @@ TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjects) {
 }
 
 TEST(Run, AReferenceNamesItsLandmarksAndItsSkin) {
-  EXPECT_THAT(WordsOf<ConfigError>([] { SmallPhantom({TemplateOfIctFiles(), "face=reference"}); }),
-              HasSubstr("face.landmarks: no file is named"));
   EXPECT_THAT(WordsOf<ConfigError>([] {
-                SmallPhantom({"face={type: reference, landmarks: skull.csv}"});
+                SmallPhantom({TemplateOfIctFiles(), "face=reference"});
               }),
-              HasSubstr("takes that head's own skin"));
+              HasSubstr("face.landmarks: no file is named"));
+  EXPECT_THAT(
+      WordsOf<ConfigError>([] { SmallPhantom({"face={type: reference, landmarks: skull.csv}"}); }),
+      HasSubstr("takes that head's own skin"));
 }
 
 // The sites of the skull that lies people's mean depth below the face of the model.
@@ -163,11 +164,11 @@ std::string SkullOfMeanPerson() {
 TEST(Run, WithoutLandmarksTheReferenceIsTheMeanPerson) {
   const testing::ScratchFolder folder;
   WriteFileAtomically(folder.Path() / "skull.csv", SkullOfMeanPerson());
-  const RunResult by_file = problems::Run(
-      SmallPhantom(
-          {TemplateOfIctFiles(), fmt::format("face={{type: reference, landmarks: {}/skull.csv}}",
-                                             folder.Path().string())}),
-      {});
+  const RunResult by_file =
+      problems::Run(SmallPhantom({TemplateOfIctFiles(),
+                                  fmt::format("face={{type: reference, landmarks: {}/skull.csv}}",
+                                              folder.Path().string())}),
+                    {});
   const RunResult carried =
       problems::Run(SmallPhantom({"template={type: ict, mean: model}", "face=reference"}), {});
   for (const Vec2& uv : {Vec2(0.5, 0.5), Vec2(0.3, 0.7), Vec2(0.8, 0.2)}) {

@@ -580,8 +580,9 @@ TEST(PointFit, StandardDeviationsAsWeightsAreNoted) {
   EXPECT_FALSE(HasNote(table, kWords));
 }
 
-// Hills(...) has noise of 0.01, and planes through neighbours miss it by 0.05. Copies that were moved by less count once, as the first of two
-// exports; points that differ by more are measurements of their own.
+// Hills(...) has noise of 0.01, and planes through neighbours miss it by 0.05. Copies that were
+// moved by less count once, as the first of two exports; points that differ by more are
+// measurements of their own.
 TEST(PointFit, ASecondExportCountsOnceAndASecondMeasurementIsNoted) {
   const PointTable once = Hills(900, 60, 0.01, 3);
   const auto with_twins = [&once](double moved_mm) {
