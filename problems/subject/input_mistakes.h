@@ -58,8 +58,9 @@ std::string DescribeFrame(const Mat3& file_from_lps);
 // Skull and skin
 // ---------------------------------------------------------------------------------------------
 
-// How far the middle of a mesh's average triangle lies inside a head, mm: coarse meshes cannot tell
-// smaller distances. For a triangle of side a on a ball of radius R it is a^2 / (6 R); R is 80 mm.
+// The distance by which the middle of an average triangle lies inside a head, in mm. Coarse meshes
+// cannot tell smaller distances. It is a^2 / (6 R) for a triangle of side a on a ball of radius R,
+// and R is 80 mm.
 double SagittaOfTriangles_mm(const TriMesh& mesh);
 
 // How skin covers bone along rays from all sides to the middle of the head. From below no ray

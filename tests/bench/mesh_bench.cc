@@ -2,11 +2,10 @@
 // Closest points and rays on a real skull against CGAL's AABB tree and VTK's locator, and
 // `import-ct` against VTK's reader and flying edges; each beside what no program can avoid: to
 // evaluate one triangle per question, and to read the file once.
-#include <CGAL/AABB_face_graph_triangle_primitive.h>
 #include <CGAL/AABB_traits.h>
 #include <CGAL/AABB_tree.h>
+#include <CGAL/AABB_triangle_primitive.h>
 #include <CGAL/Simple_cartesian.h>
-#include <CGAL/Surface_mesh.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -30,10 +29,10 @@ namespace semblance::bench {
 namespace {
 
 namespace fs = std::filesystem;
-using Kernel = CGAL::Simple_cartesian<double>;
-using CgalMesh = CGAL::Surface_mesh<Kernel::Point_3>;
-using Primitive = CGAL::AABB_face_graph_triangle_primitive<CgalMesh>;
-using CgalTree = CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>>;
+using CgalKernel = CGAL::Simple_cartesian<double>;
+using Triangles = std::vector<CgalKernel::Triangle_3>;
+using Primitive = CGAL::AABB_triangle_primitive<CgalKernel, Triangles::const_iterator>;
+using CgalTree = CGAL::AABB_tree<CGAL::AABB_traits<CgalKernel, Primitive>>;
 
 constexpr int kRounds = 5;  // programs take turns; medians count
 
@@ -79,19 +78,17 @@ Questions SkinToSkull(const fs::path& head) {
   return questions;
 }
 
-CgalMesh ToCgal(const TriMesh& mesh) {
-  CgalMesh halfedges;
-  for (const Vec3& p : mesh.points) {
-    halfedges.add_vertex({p.x(), p.y(), p.z()});
-  }
-  for (const Triangle& t : mesh.triangles) {
-    halfedges.add_face(CgalMesh::Vertex_index(t[0]), CgalMesh::Vertex_index(t[1]),
-                       CgalMesh::Vertex_index(t[2]));
-  }
-  return halfedges;
-}
+CgalKernel::Point_3 CgalPoint(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
 
-Kernel::Point_3 ToCgal(const Vec3& p) { return {p.x(), p.y(), p.z()}; }
+// Single triangles, because skulls are not manifolds.
+Triangles ToCgal(const TriMesh& mesh) {
+  Triangles triangles;
+  for (const Triangle& t : mesh.triangles) {
+    triangles.emplace_back(CgalPoint(mesh.points[t[0]]), CgalPoint(mesh.points[t[1]]),
+                           CgalPoint(mesh.points[t[2]]));
+  }
+  return triangles;
+}
 
 // The sums keep the compiler from leaving out the work, and prove that both found the same points.
 void CheckSame(const std::string& what, double ours, double theirs) {
@@ -101,7 +98,7 @@ void CheckSame(const std::string& what, double ours, double theirs) {
 }
 
 void MeasureClosest(const Questions& questions) {
-  const CgalMesh halfedges = ToCgal(questions.skull);
+  const Triangles triangles = ToCgal(questions.skull);
   double ours_mm = 0, cgal_mm = 0, floor_mm = 0;
   const auto ours = [&] {
     const MeshQuery query(questions.skull);
@@ -111,11 +108,11 @@ void MeasureClosest(const Questions& questions) {
     }
   };
   const auto cgal = [&] {
-    CgalTree tree(faces(halfedges).begin(), faces(halfedges).end(), halfedges);
+    CgalTree tree(triangles.begin(), triangles.end());
     tree.accelerate_distance_queries();
     cgal_mm = 0;
     for (const Vec3& p : questions.points) {
-      cgal_mm += std::sqrt(tree.squared_distance(ToCgal(p)));
+      cgal_mm += std::sqrt(tree.squared_distance(CgalPoint(p)));
     }
   };
   const auto one_triangle_each = [&] {
@@ -147,7 +144,7 @@ void MeasureClosest(const Questions& questions) {
 }
 
 void MeasureRays(const Questions& questions) {
-  const CgalMesh halfedges = ToCgal(questions.skull);
+  const Triangles triangles = ToCgal(questions.skull);
   double ours_mm = 0, cgal_mm = 0;
   const auto ours = [&] {
     const MeshQuery query(questions.skull);
@@ -158,11 +155,12 @@ void MeasureRays(const Questions& questions) {
     }
   };
   const auto cgal = [&] {
-    CgalTree tree(faces(halfedges).begin(), faces(halfedges).end(), halfedges);
+    CgalTree tree(triangles.begin(), triangles.end());
     cgal_mm = 0;
     for (const Vec3& p : questions.points) {
-      const auto hit = tree.first_intersection(Kernel::Ray_3(ToCgal(p), ToCgal(questions.middle)));
-      if (const auto* at = hit ? boost::get<Kernel::Point_3>(&hit->first) : nullptr) {
+      const auto hit =
+          tree.first_intersection(CgalKernel::Ray_3(CgalPoint(p), CgalPoint(questions.middle)));
+      if (const auto* at = hit ? boost::get<CgalKernel::Point_3>(&hit->first) : nullptr) {
         cgal_mm += (Vec3(at->x(), at->y(), at->z()) - p).norm();
       }
     }
@@ -179,9 +177,9 @@ void MeasureRays(const Questions& questions) {
 // The phantom of 0.5 mm, about 512 x 512 x 500 voxels, as one NIfTI file. Ours writes two files,
 // drops inner walls and decimates; VTK only makes its triangles in memory.
 void MeasureImport(const fs::path& folder) {
-  const std::string volume = (folder / "head.nii").string();
+  const std::string volume = (folder / "phantom/head.nii").string();
   CallProgram({"phantom", "--head", "smooth", "--out", (folder / "phantom").string(), "--pixel-mm",
-               "0.5", "--slice-mm", "0.5", "--volume", volume});
+               "0.5", "--slice-mm", "0.5", "--volume", "head.nii"});
   const double ours_s =
       MedianCall({"import-ct", volume, "--out", (folder / "import").string(), "--force", "--quiet"})
           .cpu_s;

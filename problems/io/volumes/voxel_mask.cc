@@ -82,6 +82,8 @@ void NumberComponents(RunSets& sets, VoxelComponents& components) {
   }
 }
 
+using SquaredDistances = std::vector<float, LargePages<float>>;  // squared, one per voxel
+
 // Parallel lines of floats; line r begins at first + r * stride, for r in [0, rows).
 struct LineStack {
   std::int64_t first = 0, stride = 0;
@@ -91,7 +93,7 @@ struct LineStack {
 // Lowers each squared distance to the least one over all lines of the stack within reach. cost[n]
 // is the squared distance of n lines.
 void LowerOverLines(const LineStack& stack, const std::vector<float>& cost,
-                    std::vector<float>& squared) {
+                    SquaredDistances& squared) {
   const int reach = static_cast<int>(cost.size()) - 1;
   std::vector<float> before(static_cast<std::size_t>(stack.rows) * stack.columns);
   std::vector<bool> any(stack.rows);
@@ -208,7 +210,7 @@ VoxelMask Dilate(const VoxelMask& mask, const VoxelGrid& grid, double distance_m
     return StepCosts(grid.spacing_mm[axis], distance_mm, grid.counts[axis]);
   };
   const std::vector<float> along = cost(0), over_rows = cost(1), over_slices = cost(2);
-  std::vector<float> squared(mask.size());
+  SquaredDistances squared(mask.size());
   ParallelFor(slices, threads, 1, [&, columns = columns, rows = rows](std::size_t k) {
     const std::int64_t first = static_cast<std::int64_t>(k) * slice;
     for (int j = 0; j < rows; ++j) {

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "problems/io/volumes/large_pages.h"
 #include "surfaces/base/geometry.h"
 
 namespace semblance::problems {
@@ -22,7 +23,7 @@ struct VoxelGrid {
 };
 
 // One entry per voxel: 1 in the set, 0 outside.
-using VoxelMask = std::vector<std::uint8_t>;
+using VoxelMask = std::vector<std::uint8_t, LargePages<std::uint8_t>>;
 
 // Voxels of a mask that follow each other along the first axis.
 struct VoxelRun {
