@@ -5,6 +5,7 @@
 #include <sys/mman.h>
 
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <new>
 
@@ -22,6 +23,9 @@ struct LargePages {
   LargePages(const LargePages<U>&) {}  // NOLINT: allocators convert into each other
 
   T* allocate(std::size_t count) {
+    if (count > kMost / sizeof(T)) {
+      throw std::bad_array_new_length();
+    }
     const std::size_t bytes = count * sizeof(T);
     if (bytes < kLeast) {
       return static_cast<T*>(::operator new(bytes));
@@ -44,7 +48,8 @@ struct LargePages {
   bool operator==(const LargePages&) const { return true; }
 
  private:
-  static constexpr std::size_t kPage = std::size_t{2} << 20, kLeast = 2 * kPage;
+  static constexpr std::size_t kPage = std::size_t{2} << 20, kLeast = 2 * kPage,
+                               kMost = PTRDIFF_MAX - 2 * kPage;
 };
 
 }  // namespace semblance::problems

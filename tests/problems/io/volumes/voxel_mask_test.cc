@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "problems/io/volumes/voxel_mask.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -55,6 +56,20 @@ TEST(VoxelMask, DilationMatchesBruteForceDistances) {
       EXPECT_EQ(grown[n] != 0, near) << n << " " << reach;
     }
   }
+}
+
+// A mask of more than 4 MB has its memory in large pages.
+TEST(VoxelMask, AVoxelInALargeMaskGrowsToABall) {
+  const VoxelGrid grid{.counts = {220, 210, 200}, .spacing_mm = Vec3(1, 1, 1)};
+  VoxelMask mask(static_cast<std::size_t>(grid.Count()), 0);
+  mask[grid.Index(120, 90, 110)] = 1;
+  const VoxelMask copy = mask;
+  VoxelMask grown = Dilate(mask, grid, 3, 2);
+  EXPECT_EQ(std::count(grown.begin(), grown.end(), 1), 123);  // integer points of that ball
+  grown.resize(10);                                           // returns to small memory
+  grown.shrink_to_fit();
+  EXPECT_THAT(grown, ::testing::Each(0));
+  EXPECT_EQ(mask, copy);
 }
 
 TEST(VoxelMask, VoxelsThatShareAFaceAreInOneComponent) {
