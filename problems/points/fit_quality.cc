@@ -174,14 +174,40 @@ std::string ReliefText(const GivenPoints& given, const PointFit& result) {
       100 * left);
 }
 
-std::string WeightText(const GivenPoints& given, const FitResult& fit, std::string_view unit) {
-  // True weights make the noise of the heavier half the smaller one, and constant noise makes both
-  // equal; estimates of equal noises differ by 1.3 at most.
-  constexpr double kFactor = 4, kRatio = 1.5;
-  if (!fit.automatic) {
-    return "";
+namespace {
+
+// For plans that do not measure the noise between neighbours: the distances from the surface. A
+// surface that follows the heavier points hides an exchange where weights are spread over 50 times.
+NoiseByWeight CompareDistancesByWeight(std::span<const double> weights,
+                                       std::span<const double> distances) {
+  constexpr std::size_t kFewest = 100;  // points in each group
+  if (weights.size() < 2 * kFewest) {
+    return {};
   }
-  const NoiseByWeight& noise = fit.automatic->by_weight;
+  const auto split = std::ranges::minmax(weights);
+  const double middle = std::sqrt(split.min * split.max);
+  std::vector<double> light, heavy;
+  for (std::size_t k = 0; k < weights.size(); ++k) {
+    (weights[k] < middle ? light : heavy).push_back(distances[k]);
+  }
+  if (light.size() < kFewest || heavy.size() < kFewest) {
+    return {};
+  }
+  return {.light_mm = UpperMedian(light),
+          .heavy_mm = UpperMedian(heavy),
+          .light_weight = split.min,
+          .heavy_weight = split.max};
+}
+
+}  // namespace
+
+std::string WeightText(const GivenPoints& given, const FitResult& fit, std::string_view unit) {
+  // True weights make the noise of the heavier points the smaller one, and constant noise makes
+  // both equal; estimates of equal noises differ by 1.3 at most.
+  constexpr double kFactor = 4, kRatio = 1.5;
+  const NoiseByWeight noise = fit.automatic
+                                  ? fit.automatic->by_weight
+                                  : CompareDistancesByWeight(given.weights, fit.residual_mm);
   if (!(noise.heavy_weight > kFactor * noise.light_weight) ||
       !(noise.heavy_mm > kRatio * noise.light_mm)) {
     return "";
@@ -190,13 +216,13 @@ std::string WeightText(const GivenPoints& given, const FitResult& fit, std::stri
                     heavy = LengthText(noise.heavy_mm, unit, 3);
   return given.has_sigma
              ? fmt::format(
-                   "points of small sigma have more noise than those of great sigma ({} and {}, "
-                   "between neighbours), and a small sigma means an exact point; if the column "
+                   "points of small sigma have more noise than those of great sigma ({} and {}), "
+                   "and a small sigma means an exact point; if the column "
                    "holds weights, name it weight",
                    heavy, light)
              : fmt::format(
-                   "points of great weight have more noise than those of small weight ({} and {}, "
-                   "between neighbours), and a great weight means an exact point; if the column "
+                   "points of great weight have more noise than those of small weight ({} and {}), "
+                   "and a great weight means an exact point; if the column "
                    "holds standard deviations, name it sigma",
                    heavy, light);
 }
@@ -227,8 +253,7 @@ std::string TwiceText(const FitResult& fit) {
   return fit.automatic && fit.automatic->measured_twice > 0
              ? fmt::format(
                    "{} points lie nearly at the places of others and differ from them by as much "
-                   "as "
-                   "neighbours do: all count, as points that were measured twice; if they are a "
+                   "as neighbours do: all count, as points that were measured twice; if they are a "
                    "rounded or moved export of the others, remove them",
                    fit.automatic->measured_twice)
              : "";

@@ -578,6 +578,11 @@ TEST(PointFit, StandardDeviationsAsWeightsAreNoted) {
   EXPECT_FALSE(HasNote(table, kWords));
   table.weights.assign(sigma.size(), 1);
   EXPECT_FALSE(HasNote(table, kWords));
+
+  table.weights = sigma;  // with a plan that does not measure the noise between neighbours
+  PointFitOptions listed;
+  listed.fit.plan = ListedPlan{{{.level = 0}}};  // finer levels meet every point
+  EXPECT_THAT(::testing::PrintToString(FitPoints(table, listed, {}).notes), HasSubstr(kWords));
 }
 
 // Hills(...) has noise of 0.01, and planes through neighbours miss it by 0.05. Copies that were
