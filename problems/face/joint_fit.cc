@@ -68,7 +68,7 @@ class JointStep {
     problem_.AddPriors(weights.prior, weights.start_pose);
   }
 
-  LevelSummary Solve() {
+  LevelSummary Solve(double function_tolerance) {
     LevelSummary summary;
     summary.level = level_;
     summary.free_vertices = static_cast<int>(net_.vertices.size());
@@ -76,10 +76,8 @@ class JointStep {
     for (const std::string& part : problem_.Parts()) {
       summary.terms.push_back({.term = part, .before = problem_.Cost(part), .after = kNaN});
     }
-    // Rotation and losses are not linear, so steps converge linearly. A smaller tolerance takes
-    // twice as many iterations and moves no vertex by 0.01 mm, and the next step starts again.
     const FaceProblemSummary solved =
-        problem_.Solve({.max_iterations = 50, .function_tolerance = 1e-7});
+        problem_.Solve({.max_iterations = 50, .function_tolerance = function_tolerance});
     for (TermCosts& term : summary.terms) {
       term.after = problem_.Cost(term.term);
     }
@@ -273,11 +271,11 @@ JointRows LinearizeJointStep(const VertexModel& model, const JointData& data,
 
 LevelSummary SolveJointStep(const VertexModel& model, const JointData& data,
                             const JointWeights& weights, const ScheduleStep& step,
-                            JointState& state) {
+                            JointState& state, double function_tolerance) {
   RequireLevel(step.level, model);
   const double rms_before_mm = ObservedRms_mm(model, data, state);
   JointStep joint(model, data, weights, step.level, state);
-  LevelSummary summary = joint.Solve();
+  LevelSummary summary = joint.Solve(function_tolerance);
   summary.fraction = step.fraction;
   summary.rms_before_mm = rms_before_mm;
   if (summary.usable) {

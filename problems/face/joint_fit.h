@@ -88,6 +88,12 @@ struct JointRows {
 JointRows LinearizeJointStep(const VertexModel& model, const JointData& data,
                              const JointWeights& weights, int level, const JointState& state);
 
+// A step ends when an iteration lowers the cost by less than this part of it. Rotation and losses
+// are not linear, so steps converge linearly. With 1e-7 they take twice as many iterations, which
+// moves the face of the Visible Human Male by 0.003 mm on average and by 0.013 mm at most; and the
+// next step starts again.
+inline constexpr double kStepTolerance = 1e-5;
+
 // Solves one step and moves the vertices of its level and the parameters by its fraction of the way
 // to the solution. The solution makes least, over the vertices r_i of residual[level], the pose,
 // and the coefficients w and a,
@@ -101,6 +107,6 @@ JointRows LinearizeJointStep(const VertexModel& model, const JointData& data,
 // InputError for a level that the model does not have.
 LevelSummary SolveJointStep(const VertexModel& model, const JointData& data,
                             const JointWeights& weights, const ScheduleStep& step,
-                            JointState& state);
+                            JointState& state, double function_tolerance = kStepTolerance);
 
 }  // namespace semblance::problems

@@ -98,8 +98,11 @@ double SumOfTerms(const std::vector<TermCosts>& terms, double TermCosts::*cost) 
   return sum;
 }
 
+constexpr double kTolerance = 1e-7;
+
 LevelSummary SolveCase(double fraction, JointCase& c) {
-  return SolveJointStep(c.model, c.data, c.weights, {.level = 0, .fraction = fraction}, c.state);
+  return SolveJointStep(c.model, c.data, c.weights, {.level = 0, .fraction = fraction}, c.state,
+                        kTolerance);
 }
 
 TEST(JointFit, EqualsTheClosedFormInWhichTheVerticesAreEliminated) {
