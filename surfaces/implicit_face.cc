@@ -13,6 +13,7 @@
 #include "surfaces/base/parallel.h"
 #include "surfaces/implicit/trim_to_border.h"
 #include "surfaces/marching/edge_intersections.h"
+#include "surfaces/mesh/solid.h"
 
 namespace semblance::surfaces {
 namespace {
@@ -71,10 +72,10 @@ double FaceExtent_mm(const TriMesh& shell, double depth_mm) {
   return Bounds(shell).sizes().maxCoeff() + 2 * depth_mm;
 }
 
-// The field is positive only within about one depth of the shell, on both of its sides. Cells that
-// are larger than 3/4 of the thinnest depth miss this layer in places that depend on the grid's
-// pose, and the face gets holes there. So a coarser resolution is raised, but to the default at
-// most, because the cost grows with its square.
+// Where cells are larger than 3/4 of the thinnest depth, the polygons cut into bone. Over a shell
+// without a solid inside they miss the layer of tissue in places that depend on the grid's pose,
+// and the face gets holes there. So a coarser resolution is raised, but to the default at most,
+// because the cost grows with its square.
 int FineEnough(int resolution, double extent_mm, double thinnest_mm) {
   constexpr double kCellOfThinnest = 0.75;
   const int needed =
@@ -228,13 +229,7 @@ TriMesh KeepOutermost(const TriMesh& mesh, int& dropped) {
     throw InputError("outermost surface: the mesh has no triangles");
   }
   const Components components = ConnectedComponents(mesh);
-  std::vector<double> volume(components.count, 0);
-  const Vec3 middle = Bounds(mesh).center();  // the volume of an open mesh depends on this point
-  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
-    const Triangle& c = mesh.triangles[t];
-    const Vec3 a = mesh.points[c[0]] - middle, b = mesh.points[c[1]] - middle;
-    volume[components.of_triangle[t]] += a.dot(b.cross(mesh.points[c[2]] - middle));
-  }
+  const std::vector<double> volume = EnclosedVolumes(mesh, components);
   const int largest =
       static_cast<int>(std::max_element(volume.begin(), volume.end()) - volume.begin());
   std::vector<bool> keep(mesh.triangles.size());

@@ -130,7 +130,8 @@ class JointFitter {
         model_(MakeVertexModel(in.prior->face, in.prior->on_template, made_.prior->field,
                                surface_.shape())),
         state_(StartJoint(surface_.shape(), made_.prior->frame, made_.prior->parameters)),
-        features_(FeaturesOn(*made_.prior, in.prior->face)) {
+        features_(FeaturesOn(*made_.prior, in.prior->face)),
+        bone_(in.shell) {
     const ShapeFitOptions& estimate = options.use.estimate;
     weights_ = {.residual = options.residual,
                 .prior = {.scale_sd = estimate.scale_sd,
@@ -197,7 +198,9 @@ class JointFitter {
     seeding_ = implicit_ ? MakeSeeds(surface_, implicit_->query(), in_,
                                      TemplateMasks(made_.placed.face), Seeds())
                          : SeedResult{.points = {}, .masked = 0, .missed = 0, .folded = 0};
-    std::erase_if(seeding_.points, [&](const FitPoint& seed) { return !IsTrusted(seed.position); });
+    std::erase_if(seeding_.points, [&](const FitPoint& seed) {
+      return !IsTrusted(seed.position) || IsFarFromFace(seed);
+    });
     // A seed stands for the area of its patch: patches round the mouth are small.
     std::vector<double> areas;
     for (const FitPoint& seed : seeding_.points) {
@@ -221,6 +224,17 @@ class JointFitter {
                                   return (feature.center - p).norm() < feature.radius_mm;
                                 }) &&
            !dowels_.empty() && (NearestDowel(p).point.position - p).norm() < range_mm;
+  }
+
+  // Returns true if the face is far from the seed and nearer to the bone below it, along the seed's
+  // line. The implicit face is then off by half the tissue or more, as where the filled skull
+  // bridges the temple, and the face model knows better. A face inside the bone keeps its seeds,
+  // which lift it.
+  bool IsFarFromFace(const FitPoint& seed) const {
+    const Vec3 at = surface_.Point(seed.uv);
+    const double way_mm = (seed.position - at).norm();
+    return way_mm > options_.use.estimate.surface_sd_mm &&
+           bone_.FirstHit(at, -surface_.Frame(seed.uv).Normal(), way_mm).has_value();
   }
 
   const SlidingDowel& NearestDowel(const Vec3& p) const {
@@ -409,6 +423,7 @@ class JointFitter {
   JointData data_;
   std::vector<SlidingDowel> dowels_;
   std::optional<ImplicitObserver> implicit_;
+  MeshQuery bone_;
   SeedResult seeding_;
   std::vector<LevelSummary> levels_;
   std::vector<RelaxationSummary> slides_;

@@ -141,6 +141,7 @@ LikelyFace FindLikelyFace(const PriorUse& use, PlacedTemplate placed, const Face
   if (implicit != nullptr) {
     ImplicitSpread spread =
         ImplicitSpread_mm(use.implicit_spread, *implicit, in.shell, dowels, table, context.threads);
+    target.bone = &in.shell;
     target.surface_sd_mm = std::move(spread.sd);
     target.surface_error_mm = std::move(spread.error);
   }

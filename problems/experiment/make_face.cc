@@ -7,10 +7,12 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <type_traits>
 #include <utility>
+#include <variant>
 
 #include "interp/schemes/people.h"
 #include "problems/experiment/dowel_projection.h"
@@ -132,6 +134,31 @@ void Weigh(const FitTarget& dowels, const PriorKnowledge& known, std::vector<Fit
   WeighSeeds(tips, known.features, *known.trust, seeds);
 }
 
+// Drops the seeds at which the face lies nearer to bone than to the implicit face, along the seed's
+// line. Before the last round they hold creases, because wrong (u,v) fold the face into the bone
+// (RelaxationWorthThorough); in the last round they lift the face off the bone.
+void DropBeyondBone(const HSplineSurface& surface, int direction_level, const MeshQuery& bone,
+                    SeedResult& seeding) {
+  const auto dropped = std::erase_if(seeding.points, [&](const FitPoint& seed) {
+    const Vec3 at = surface.Point(seed.uv);
+    const Vec3 outward = surface.LevelFrame(direction_level, seed.uv).Normal();
+    const double way_mm = (seed.position - at).norm();
+    return bone.FirstHit(at, outward, way_mm) || bone.FirstHit(at, -outward, way_mm);
+  });
+  seeding.missed += static_cast<int>(dropped);
+}
+
+SeedResult SeedRound(const FitPlan& plan, int round, const HSplineSurface& surface,
+                     const MeshQuery& implicit, const FaceInput& in,
+                     std::span<const Sphere> masks) {
+  SeedResult seeding = MakeSeeds(surface, implicit, in, masks, plan.seeds);
+  const auto* const patches = std::get_if<SeedOptions>(&plan.seeds);
+  if (patches != nullptr && round + 1 < plan.rounds) {
+    DropBeyondBone(surface, patches->direction_level, MeshQuery(in.shell), seeding);
+  }
+  return seeding;
+}
+
 // Fits the dowels first. Then each round takes seeds from the surface as it lies now and runs the
 // schedule with dowels and seeds (see seeding.h for the reason).
 FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInput& in,
@@ -145,7 +172,7 @@ FaceFit FitFace(const FitPlan& plan, const PlacedTemplate& placed, const FaceInp
   std::optional<FaceFit> result;
   for (int round = 0; round < plan.rounds; ++round) {
     context.Report("fit", fmt::format("round {} of {}", round + 1, plan.rounds));
-    SeedResult seeding = MakeSeeds(surface, query, in, masks, plan.seeds);
+    SeedResult seeding = SeedRound(plan, round, surface, query, in, masks);
     Weigh(dowels, known, seeding.points);
     FitTarget target = WithSeeds(dowels, seeding.points, plan.fit.terms, in.shell);
     target.shape = known.shape;

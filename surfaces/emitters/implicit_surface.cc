@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <optional>
 #include <type_traits>
 #include <utility>
 #include <variant>
@@ -14,6 +15,7 @@
 #include "surfaces/emitters/emitter_search.h"
 #include "surfaces/emitters/emitter_triangle.h"
 #include "surfaces/emitters/flat_kernel.h"
+#include "surfaces/mesh/solid.h"
 
 namespace semblance::surfaces {
 namespace {
@@ -102,6 +104,10 @@ struct ImplicitSurface::Impl {
         tail_error(options.tail_error),
         decay(std::visit([](const auto& k) { return k.Decay(); }, kernel)) {
     std::visit([this](const auto& k) { MakeLanes(k); }, kernel);
+    if (std::ranges::all_of(depth_mm, [](double d) { return std::isfinite(d); }) &&
+        BoundsSolid(skull)) {
+      solid.emplace(skull);
+    }
   }
 
   void MakeLanes(const FlatKernel& k) {
@@ -177,6 +183,8 @@ struct ImplicitSurface::Impl {
     return std::visit([&](const auto& k) { return SumEmissions(k, list, p, evaluations); }, kernel);
   }
 
+  bool IsSolid(const Vec3& p) const { return solid && solid->Contains(p); }
+
   int RunLength() const {
     return std::visit([]<class EmitterKernel>(const EmitterKernel&) { return EmitterKernel::kRun; },
                       kernel);
@@ -189,6 +197,7 @@ struct ImplicitSurface::Impl {
   std::vector<FlatEmitterLanes> flat_lanes;          // per eight emitters, for `flat`
   std::vector<DistanceEmitterLanes> distance_lanes;  // per eight emitters, else
   std::vector<ReachBall> reach_balls;                // per half of distance_lanes
+  std::optional<Solid> solid;                        // if the skull is closed and emits everywhere
   double sum_share, tail_error, decay;
 };
 
@@ -200,7 +209,8 @@ ImplicitSurface::ImplicitSurface(ImplicitSurface&&) noexcept = default;
 
 double ImplicitSurface::Value(const Vec3& p) const {
   std::int64_t evaluations = 0;
-  return impl_->Sum(p, evaluations) - 1;
+  const double emission = impl_->Sum(p, evaluations);
+  return (emission <= 1 && impl_->IsSolid(p) ? kMaxEmission : emission) - 1;
 }
 
 double ImplicitSurface::Flattened(const Vec3& p) const {
@@ -209,11 +219,14 @@ double ImplicitSurface::Flattened(const Vec3& p) const {
 }
 
 double ImplicitSurface::Flattened(const Vec3& p, std::int64_t& emitters) const {
-  return Flatten(impl_->Sum(p, emitters));
+  return FlattenAt(p, impl_->Sum(p, emitters));
 }
 
-double ImplicitSurface::Flatten(double emission) const {
+double ImplicitSurface::FlattenAt(const Vec3& p, double emission) const {
   constexpr double kLowest = -10;
+  if (emission <= 1 && impl_->IsSolid(p)) {
+    return 1;
+  }
   return emission > 0 ? std::max(1 - std::pow(emission, -1 / impl_->decay), kLowest) : kLowest;
 }
 

@@ -34,7 +34,9 @@ void Fields(Visitor& visit, ImplicitOptions& o) {
 
 // The field Value(p) = sum of emissions - 1, positive inside. It is finite everywhere: each
 // emission is at most 1e12, and distances (for `flat` with an integer decay: heights) below 5 % of
-// the depth count as 5 %.
+// the depth count as 5 %. The inside of a skull that bounds a solid (BoundsSolid) and has depths
+// everywhere is solid: it emits 1e12. So the tissue has no second surface on the bone, and none
+// where it is thinner than a cell of a polygonizer's grid.
 class ImplicitSurface {
  public:
   // depth_mm: one per vertex. A triangle emits with the mean of its three depths (thesis 3.1), or
@@ -48,13 +50,14 @@ class ImplicitSurface {
 
   double Value(const Vec3& p) const;  // thread-safe
 
-  // Flattened(p) = 1 - (Value(p) + 1)^(-1/decay), at least -10. It has the sign of Value, but over
-  // a plate of depth l it is (l - h) / l at height h. Hence a search for the surface looks for the
-  // zero of a nearly linear function.
+  // Flattened(p) = 1 - (Value(p) + 1)^(-1/decay), at least -10, and 1 in the solid. It has the sign
+  // of Value, but over a plate of depth l it is (l - h) / l at height h. Hence a search for the
+  // surface looks for the zero of a nearly linear function.
   double Flattened(const Vec3& p) const;
   // The same; adds the number of evaluated emitters to `emitters`.
   double Flattened(const Vec3& p, std::int64_t& emitters) const;
-  double Flatten(double emission) const;  // emission = Value(p) + 1
+  // The same from the sum of emissions at p.
+  double FlattenAt(const Vec3& p, double emission) const;
 
   // The emissions of single emitters, for a polygonizer that sums them itself (thesis 3.2).
   // Emitters have the numbers 0 to EmitterCount() - 1.
@@ -72,7 +75,8 @@ class ImplicitSurface {
   double SumShare() const;
   void BoundsIn(const Box3& box, std::span<const std::int32_t> emitters,
                 std::span<EmissionBounds> bounds) const;
-  // Bounds of Value(p) + 1 in the box.
+  // Bounds of the sum of emissions in the box. Where the sum exceeds 1 in no point of a box, all of
+  // it is solid or all of it is outside, because next to the bone every sum is larger.
   EmissionBounds BoundsIn(const Box3& box) const;
   // The box around the triangle (and, for `split`, the moved triangle), widened by d = l m^(1/k)
   // with l the emitting depth: m emitters at that distance would just make a surface (thesis

@@ -291,7 +291,7 @@ class ListedField {
     const double share = surface_.SumShare() + kSumRounding;
     const bool inside = (1 - share) * sum - surface_.TailError() > 1;
     const bool outside = (1 + share) * (sum + influence_.slack) + surface_.TailError() < 1;
-    return inside || outside ? surface_.Flatten(sum)
+    return inside || outside ? surface_.FlattenAt(p, sum)
                              : surface_.Flattened(p, summary_.emitter_evaluations);
   }
 

@@ -3,6 +3,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "surfaces/base/error.h"
 #include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/skull_fill.h"
@@ -35,6 +38,34 @@ TEST(ImplicitFace, OverASphereItIsASphereClosedAndManifold) {
   }
   EXPECT_TRUE(face.notes.empty());
   EXPECT_GT(face.counts.corner_evaluations, 0);
+}
+
+// Without the solid inside, most corners of the grid would miss the layer of tissue.
+TEST(ImplicitFace, TissueMuchThinnerThanACellMakesOneSheetWithoutHoles) {
+  const TriMesh sphere = SphereMesh({3, 2, 1}, 80, 40);
+  for (const Emitter& emitter : {Emitter(FlatEmitter{}), Emitter(ThesisEmitter{.decay = 15})}) {
+    const ImplicitFace face =
+        BuildImplicitFace(sphere, std::vector<double>(sphere.points.size(), 0.5),
+                          {.field = {.emitter = emitter}, .resolution = 30}, {});
+    ExpectClosedManifold(face.dense);
+    EXPECT_GT(face.cell_mm, 1);
+    EXPECT_EQ(ConnectedComponents(face.dense).count, 1);
+    EXPECT_NEAR(SignedVolume(face.dense), 4.0 / 3 * std::numbers::pi * std::pow(80.5, 3),
+                0.02 * SignedVolume(face.dense));
+    const auto euler = std::ssize(face.dense.points) - CheckEdges(face.dense).edges +
+                       std::ssize(face.dense.triangles);
+    EXPECT_EQ(euler, 2);  // a sphere's: no tunnels
+  }
+}
+
+TEST(ImplicitFace, OverAnOpenShellThinTissueRaisesTheResolution) {
+  const TriMesh plate = Plate(60, 20);
+  const ImplicitFace face = BuildImplicitFace(plate, std::vector<double>(plate.points.size(), 1.5),
+                                              {.resolution = 20}, {});
+  ExpectClosedManifold(face.dense);
+  EXPECT_LT(face.cell_mm, 0.76 * 1.5);
+  ASSERT_FALSE(face.notes.empty());
+  EXPECT_NE(face.notes[0].find("raised from 20"), std::string::npos) << face.notes[0];
 }
 
 TEST(ImplicitFace, ThreadsChangeNoBit) {

@@ -159,23 +159,33 @@ class DrawingSurface {
         otherwise_sd_mm_(options.surface_sd_mm),
         correspondences_(mesh_, OpenBorder::kReject),
         match_{.reach_mm = options.surface_reach_mm,
-               .least_cosine = std::cos(options.surface_max_angle_deg * std::numbers::pi / 180)} {}
+               .least_cosine = std::cos(options.surface_max_angle_deg * std::numbers::pi / 180)} {
+    if (target.bone != nullptr) {
+      bone_.emplace(*target.bone);
+    }
+  }
 
   struct Foot {
     Vec3 position, normal;
     double sd_mm;     // for the weight
     double error_mm;  // for sigma
   };
-  // The foot of a point with this normal, if it is within reach and faces the same way.
+  // The foot of a point with this normal, if it is within reach, not too far compared with
+  // bone, and faces the same way.
   std::optional<Foot> FindFoot(const Vec3& p, const Vec3& normal) const {
     const auto found = correspondences_.Find(p, normal, match_);
-    return found ? std::optional(Foot{found->point.position, found->normal,
-                                      ValueAt(found->point, sd_mm_),
-                                      ValueAt(found->point, error_mm_)})
-                 : std::nullopt;
+    if (!found || IsNearerToBone(p, found->point.distance_mm)) {
+      return std::nullopt;
+    }
+    return Foot{found->point.position, found->normal, ValueAt(found->point, sd_mm_),
+                ValueAt(found->point, error_mm_)};
   }
 
  private:
+  bool IsNearerToBone(const Vec3& p, double away_mm) const {
+    return bone_ && away_mm > otherwise_sd_mm_ && bone_->Closest(p).distance_mm < away_mm;
+  }
+
   double ValueAt(const MeshPoint& at, std::span<const double> values) const {
     if (values.empty()) {
       return otherwise_sd_mm_;
@@ -190,6 +200,7 @@ class DrawingSurface {
   double otherwise_sd_mm_;
   Correspondences correspondences_;
   CorrespondenceOptions match_;
+  std::optional<MeshQuery> bone_;
 };
 
 // ---------------------------------------------------------------------------------------------

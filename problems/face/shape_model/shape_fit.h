@@ -191,6 +191,10 @@ struct ShapeTarget {
   Similarity start;                  // subject_from_model
   std::vector<ShapeTip> tips;        // may be empty
   const TriMesh* surface = nullptr;  // outward, in the subject's frame; null: the tips alone
+  // Points that are nearer to this bone than to the surface, and more than the surface's deviation
+  // away from it, are not drawn to the surface: one of the two is then off by half the tissue or
+  // more; null: none.
+  const TriMesh* bone = nullptr;
   std::vector<ShapeFeature> features;
   std::vector<double> surface_sd_mm = {};     // one per point of the surface; empty: the option's
   std::vector<double> surface_error_mm = {};  // its errors, for sigma; empty: surface_sd_mm
