@@ -72,7 +72,7 @@ double FaceExtent_mm(const TriMesh& shell, double depth_mm) {
   return Bounds(shell).sizes().maxCoeff() + 2 * depth_mm;
 }
 
-// Where cells are larger than 3/4 of the thinnest depth, the polygons cut into bone. Over a shell
+// The polygons cut into bone where cells are larger than 3/4 of the thinnest depth. Over a shell
 // without a solid inside they miss the layer of tissue in places that depend on the grid's pose,
 // and the face gets holes there. So a coarser resolution is raised, but to the default at most,
 // because the cost grows with its square.

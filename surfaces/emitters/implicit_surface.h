@@ -75,8 +75,8 @@ class ImplicitSurface {
   double SumShare() const;
   void BoundsIn(const Box3& box, std::span<const std::int32_t> emitters,
                 std::span<EmissionBounds> bounds) const;
-  // Bounds of the sum of emissions in the box. Where the sum exceeds 1 in no point of a box, all of
-  // it is solid or all of it is outside, because next to the bone every sum is larger.
+  // Bounds of the sum of emissions in the box. If the sum exceeds 1 nowhere in a box, all of it
+  // is solid or all of it is outside, because every sum next to the bone is larger.
   EmissionBounds BoundsIn(const Box3& box) const;
   // The box around the triangle (and, for `split`, the moved triangle), widened by d = l m^(1/k)
   // with l the emitting depth: m emitters at that distance would just make a surface (thesis
