@@ -62,7 +62,7 @@ TEST(Solid, AgreesWithTheSumOfSolidAngles) {
   EXPECT_LT(inside, 3500);
 }
 
-// Next to vertices and edges the nearest triangle alone would decide wrongly.
+// Rays and closest points have their special cases there.
 TEST(Solid, DecidesNextToVerticesAndEdges) {
   const TriMesh mesh = SpikyBall();
   const Solid solid(mesh);

@@ -242,6 +242,32 @@ TEST(ShapeEstimate, TheSurfaceDrawsPointsFarFromTips) {
   EXPECT_LT(error(&shape), 0.7 * error(nullptr));
 }
 
+// The tips hold the shape on the mean; surface and bone are the mean, lifted and sunk.
+TEST(ShapeEstimate, AFarSurfaceDrawsNoPointsThatAreNearerToBone) {
+  const ShapeModel model = Dome();
+  ShapeTarget target;
+  for (int t = 0; t < std::ssize(model.mean.triangles); t += 4) {
+    target.tips.push_back(TipAt(model, t, model.mean.points));
+  }
+  const auto at_height = [&](double z_mm) {
+    TriMesh mesh = model.mean;
+    for (Vec3& p : mesh.points) {
+      p.z() += z_mm;
+    }
+    return mesh;
+  };
+  const auto drawn = [&](double surface_mm, double bone_mm) {
+    const TriMesh surface = at_height(surface_mm), bone = at_height(bone_mm);
+    target.surface = &surface;
+    target.bone = std::isfinite(bone_mm) ? &bone : nullptr;
+    return EstimateShape(model, target, {}, {}).surface_points;
+  };
+  EXPECT_GT(drawn(6, kNaN), 20);
+  EXPECT_EQ(drawn(6, -2), 0);
+  EXPECT_EQ(drawn(6, -40), drawn(6, kNaN));
+  EXPECT_EQ(drawn(1, -0.2), drawn(1, kNaN));  // within the surface's deviation
+}
+
 TEST(ShapeEstimate, OneFarTipHasLittleEffect) {
   const ShapeModel model = Dome();
   ShapeTarget target;
