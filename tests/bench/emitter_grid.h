@@ -30,7 +30,7 @@ class EmitterGrid {
 
   double Flattened(const Vec3& p) const {
     const std::array<int, 3> at = CellOf(p);
-    return surface_.Flatten(surface_.SumEmissions(cells_[Index(at[0], at[1], at[2])], p));
+    return surface_.FlattenAt(p, surface_.SumEmissions(cells_[Index(at[0], at[1], at[2])], p));
   }
 
  private:
