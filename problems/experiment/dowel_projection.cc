@@ -103,9 +103,8 @@ TriMesh IndentShell(TriMesh shell, std::span<const Dowel> dowels_on_bone, const 
 }
 
 ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels_on_bone, const TriMesh& shell,
-                                 double least_depth_mm) {
+                                 const MeshQuery& query, double least_depth_mm) {
   constexpr double kLeastNoted_mm = 1;  // smaller gaps are not worth a note
-  const MeshQuery query(shell);
   ProjectedDowels result;
   for (Dowel dowel : dowels_on_bone) {
     const double beyond = WayOut(dowel, shell, query);

@@ -13,6 +13,7 @@
 #include "problems/experiment/experiment.h"
 #include "problems/face/template_face.h"
 #include "problems/subject/extra_sites.h"
+#include "surfaces/mesh/mesh_query.h"
 #include "surfaces/mesh/tri_mesh.h"
 
 namespace semblance::problems {
@@ -37,9 +38,9 @@ struct ProjectedDowels {
 // If the shell runs over a dowel's base, the base moves along the dowel onto the shell and the
 // depth shrinks by the same length, so that the tip stays. A dowel that ends under the shell, or
 // less than least_depth_mm (> 0) over it, keeps least_depth_mm over it. All other dowels stay as
-// they are.
+// they are. `query` must be that of the shell.
 ProjectedDowels ProjectOntoShell(std::span<const Dowel> dowels_on_bone, const TriMesh& shell,
-                                 double least_depth_mm);
+                                 const MeshQuery& query, double least_depth_mm);
 
 // ---------------------------------------------------------------------------------------------
 // Into the fit

@@ -279,7 +279,9 @@ CheckFindings InputCheck::CheckCase(const Experiment& experiment) {
     const auto subject = loaded_.Get<SubjectData>(StageKey("subject", experiment.subject), [&] {
       return LoadSubject(experiment.subject, context_);
     });
-    const Case made = MakeCase(*subject, experiment, {});
+    const auto bone = own_.Get<MeshQuery>(StageKey("bone", experiment.subject),
+                                             [&] { return MeshQuery(subject->skull); });
+    const Case made = MakeCase(*subject, experiment, *bone, {});
     CheckFaceOptions(experiment, made);
     for (const TextLines& notes :
          {made.notes, ExplainUnusedRules(experiment, made, loaded_, context_)}) {

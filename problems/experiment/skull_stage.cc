@@ -255,11 +255,15 @@ DepthStage BuildDepthStage(const Experiment& e, StageCache& cache, StepClock& st
   const auto* const wrap = std::get_if<WrapFill>(&e.fill);
   TriMesh pressed =
       wrap ? IndentShell(*shell, subject.dowels_on_bone, data->skull, wrap->press_mm) : *shell;
-  ProjectedDowels projected = ProjectOntoShell(subject.dowels_on_bone, pressed, kLeastDepth_mm);
+  const MeshQuery query(pressed);
+  const auto project = [&](std::span<const Dowel> dowels_on_bone) {
+    return ProjectOntoShell(dowels_on_bone, pressed, query, kLeastDepth_mm);
+  };
+  ProjectedDowels projected = project(subject.dowels_on_bone);
   subject.notes.insert(subject.notes.end(), projected.notes.begin(), projected.notes.end());
   std::vector<Vec3> normals = VertexNormals(pressed);
-  ProjectedDowels expected = ProjectOntoShell(subject.expected_on_bone, pressed, kLeastDepth_mm);
-  ProjectedDowels scored = ProjectOntoShell(subject.scored_on_bone, pressed, kLeastDepth_mm);
+  ProjectedDowels expected = project(subject.expected_on_bone);
+  ProjectedDowels scored = project(subject.scored_on_bone);
   DepthStage stage{std::move(subject),
                    FindUpright(*data),
                    std::move(pressed),

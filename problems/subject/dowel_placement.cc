@@ -88,25 +88,15 @@ double AreaInside(const Vec3& a, const Vec3& b, const Vec3& c, const Sphere& bal
          AreaInside(ca, bc, c, ball, splits - 1) + AreaInside(ab, bc, ca, ball, splits - 1);
 }
 
-double AreaInside(const TriMesh& mesh, int t, const Sphere& ball) {
-  const Triangle& triangle = mesh.triangles[t];
-  Box3 box;
-  for (const auto p : triangle) {
-    box.extend(mesh.points[p]);
-  }
-  if (box.squaredExteriorDistance(ball.center) > ball.radius_mm * ball.radius_mm) {
-    return 0;  // true for nearly all triangles of a mesh
-  }
-  return AreaInside(mesh.points[triangle[0]], mesh.points[triangle[1]], mesh.points[triangle[2]],
-                    ball, kMaxSplits);
-}
-
 // The area inside the ball, by triangle: of each triangle that reaches into it, and of `first`.
-std::map<int, double> AreasInside(const TriMesh& mesh, int first, const Sphere& ball) {
-  std::map<int, double> areas;
-  for (int t = 0; t < static_cast<int>(mesh.triangles.size()); ++t) {
-    const double area = AreaInside(mesh, t, ball);
-    if (area > 0 || t == first) {
+std::map<int, double> AreasInside(const TriMesh& mesh, const MeshQuery& query, int first,
+                                  const Sphere& ball) {
+  std::map<int, double> areas = {{first, 0}};
+  for (const int t : query.TrianglesNear(ball.center, ball.radius_mm)) {
+    const auto& [a, b, c] = mesh.triangles[t];
+    const double area =
+        AreaInside(mesh.points[a], mesh.points[b], mesh.points[c], ball, kMaxSplits);
+    if (area > 0) {
       areas[t] = area;
     }
   }
@@ -148,12 +138,12 @@ Vec3 SnapToSkull(const LandmarkFile& file, const Landmark& landmark, const MeshP
 }
 
 Vec3 DirectionAt(const LandmarkFile& file, const Landmark& landmark, const TriMesh& skull,
-                 const MeshPoint& base, const PlaceOptions& options) {
+                 const MeshQuery& query, const MeshPoint& base, const PlaceOptions& options) {
   if (landmark.normal) {
     return Vec3(landmark.normal->data()).normalized();
   }
   const Vec3 normal =
-      AveragedNormal(skull, base.triangle, {base.position, options.normal_radius_mm});
+      AveragedNormal(skull, query, base.triangle, {base.position, options.normal_radius_mm});
   if (normal.isZero()) {
     throw InputError(fmt::format(
         "{}: site {}: the skull's triangles within {} mm have no area, so they define no "
@@ -226,7 +216,7 @@ std::map<std::string, double> TurnsOfDowels(const LandmarkFile& file, const TriM
     }
     const MeshPoint base = query.Closest(landmark.Position());
     const Vec3 own =
-        AveragedNormal(skull, base.triangle, {base.position, options.normal_radius_mm});
+        AveragedNormal(skull, query, base.triangle, {base.position, options.normal_radius_mm});
     if (own.isZero()) {
       continue;
     }
@@ -277,14 +267,14 @@ std::vector<Dowel> PlaceDowels(const LandmarkFile& file, const TriMesh& skull,
     Dowel dowel;
     dowel.site = landmark.site;
     dowel.base = SnapToSkull(file, landmark, nearest, options);
-    dowel.direction = DirectionAt(file, landmark, skull, nearest, options);
+    dowel.direction = DirectionAt(file, landmark, skull, query, nearest, options);
     dowels.push_back(dowel);
   }
   return dowels;
 }
 
-Vec3 AveragedNormal(const TriMesh& mesh, int first, const Sphere& ball) {
-  const std::map<int, double> area_inside = AreasInside(mesh, first, ball);
+Vec3 AveragedNormal(const TriMesh& mesh, const MeshQuery& query, int first, const Sphere& ball) {
+  const std::map<int, double> area_inside = AreasInside(mesh, query, first, ball);
   const auto by_point = TrianglesByPoint(mesh, area_inside);
   const Vec3 facing = UnitNormal(mesh, first);
   const double least_cosine = facing.isZero() ? -2 : std::cos(80 * std::numbers::pi / 180);

@@ -190,6 +190,7 @@ std::map<std::string, double> TurnsOfDowels(const LandmarkFile& file, const TriM
 // connected there with the triangle `first` and face within 80 degrees of it, so that the inner
 // side of a thin wall does not count (any direction counts if `first` has no area). A triangle's
 // area counts as far as it lies inside the ball, to some percent. Zero if there is no such area.
-Vec3 AveragedNormal(const TriMesh& mesh, int first, const Sphere& ball);
+// `query` must be that of the mesh.
+Vec3 AveragedNormal(const TriMesh& mesh, const MeshQuery& query, int first, const Sphere& ball);
 
 }  // namespace semblance::problems

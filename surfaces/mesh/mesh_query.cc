@@ -106,6 +106,12 @@ MeshPoint MeshQuery::Closest(const Vec3& p) const {
   return {at.position, triangle, (at.position - p).norm(), at.weights};
 }
 
+std::vector<int> MeshQuery::TrianglesNear(const Vec3& p, double distance_mm) const {
+  std::vector<int> near = tree_->Near(p, distance_mm);
+  std::ranges::sort(near);
+  return near;
+}
+
 std::vector<MeshPoint> MeshQuery::AllHits(const Vec3& origin, const Vec3& direction,
                                           double max_distance_mm) const {
   const Vec3 ray = max_distance_mm * direction.normalized();

@@ -40,6 +40,10 @@ class MeshQuery {
 
   MeshPoint Closest(const Vec3& p) const;
 
+  // The triangles within distance_mm of p, in ascending order, and possibly others just outside: a
+  // superset that spares a pass over the whole mesh.
+  std::vector<int> TrianglesNear(const Vec3& p, double distance_mm) const;
+
   // The first point along the ray from `origin` in `direction` (not zero; it need not be unit)
   // within max_distance_mm, or nothing.
   std::optional<MeshPoint> FirstHit(const Vec3& origin, const Vec3& direction,

@@ -202,6 +202,26 @@ int TriangleTree::Nearest(const Vec3& p) const {
   return best;
 }
 
+std::vector<int> TriangleTree::Near(const Vec3& p, double distance_mm) const {
+  const double reach2 = distance_mm * distance_mm;
+  std::vector<int> near;
+  std::vector<std::int32_t> waiting = {0};
+  while (!waiting.empty()) {
+    const std::int32_t index = waiting.back();
+    const Node& node = nodes_[index];
+    waiting.pop_back();
+    if (node.SquaredDistance(p) > reach2) {
+      continue;
+    }
+    if (node.count == 0) {
+      waiting.insert(waiting.end(), {index + 1, node.next});
+    } else {
+      near.insert(near.end(), &triangle_[node.next], &triangle_[node.next] + node.count);
+    }
+  }
+  return near;
+}
+
 // ---------------------------------------------------------------------------------------------
 // Rays
 // ---------------------------------------------------------------------------------------------

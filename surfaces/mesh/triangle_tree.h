@@ -28,6 +28,9 @@ class TriangleTree {
   // same distance, as at a corner.
   int Nearest(const Vec3& p) const;
 
+  // The triangles of all leaves within distance_mm of p, unordered.
+  std::vector<int> Near(const Vec3& p, double distance_mm) const;
+
   // The hits with `along` from 0 to 1, unordered. A ray in the plane of a triangle, or a triangle
   // without area, has no hit. A ray through an edge hits all triangles of the edge: none slips
   // through between two triangles (Woop, Benthin & Wald 2013).

@@ -20,7 +20,8 @@ std::vector<Vec3> BorderPoints(const TriMesh& mesh) {
 
 Vec3 BoneDirection(const Vec3& point, const SuggestedBone& bone) {
   constexpr double kRadius_mm = 3;  // as a depth marker's direction (PlaceOptions)
-  return AveragedNormal(bone.mesh, bone.query.Closest(point).triangle, {point, kRadius_mm});
+  return AveragedNormal(bone.mesh, bone.query, bone.query.Closest(point).triangle,
+                        {point, kRadius_mm});
 }
 
 }  // namespace

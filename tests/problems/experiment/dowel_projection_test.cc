@@ -25,7 +25,7 @@ class ShellDowelsTest : public ::testing::Test {
 
 TEST_F(ShellDowelsTest, OnTheShellADowelStaysAsItIs) {
   const std::vector<Dowel> dowels = {DowelAt(50.0, 7), DowelAt(50.3, 7, {-1, 1, 0})};
-  const ProjectedDowels projected = ProjectOntoShell(dowels, shell_, 1);
+  const ProjectedDowels projected = ProjectOntoShell(dowels, shell_, MeshQuery(shell_), 1);
   for (int n = 0; n < 2; ++n) {
     EXPECT_NEAR(projected.dowels_on_shell[n].depth_mm, 7, 0.05);
     EXPECT_LT((projected.dowels_on_shell[n].Tip() - dowels[n].Tip()).norm(), 1e-9);
@@ -35,7 +35,7 @@ TEST_F(ShellDowelsTest, OnTheShellADowelStaysAsItIs) {
 
 TEST_F(ShellDowelsTest, UnderTheShellItIsShortenedAndItsTipStays) {
   const std::vector<Dowel> dowels = {DowelAt(40, 25)};
-  const ProjectedDowels projected = ProjectOntoShell(dowels, shell_, 1);
+  const ProjectedDowels projected = ProjectOntoShell(dowels, shell_, MeshQuery(shell_), 1);
   EXPECT_NEAR(projected.dowels_on_shell[0].base.norm(), 50, 0.05);
   EXPECT_NEAR(projected.dowels_on_shell[0].depth_mm, 15, 0.05);
   EXPECT_LT((projected.dowels_on_shell[0].Tip() - dowels[0].Tip()).norm(), 1e-9);
@@ -44,7 +44,7 @@ TEST_F(ShellDowelsTest, UnderTheShellItIsShortenedAndItsTipStays) {
 
 TEST_F(ShellDowelsTest, OneThatEndsUnderTheShellKeepsTheLeastDepthOverIt) {
   const ProjectedDowels projected =
-      ProjectOntoShell(std::vector<Dowel>{DowelAt(40, 6)}, shell_, 1.5);
+      ProjectOntoShell(std::vector<Dowel>{DowelAt(40, 6)}, shell_, MeshQuery(shell_), 1.5);
   EXPECT_NEAR(projected.dowels_on_shell[0].base.norm(), 50, 0.05);
   EXPECT_EQ(projected.dowels_on_shell[0].depth_mm, 1.5);
   EXPECT_THAT(projected.notes, ElementsAre(HasSubstr("ends 4.0 mm under the shell")));
@@ -52,7 +52,7 @@ TEST_F(ShellDowelsTest, OneThatEndsUnderTheShellKeepsTheLeastDepthOverIt) {
 
 TEST_F(ShellDowelsTest, NoDowelIsMadeLonger) {
   const ProjectedDowels projected =
-      ProjectOntoShell(std::vector<Dowel>{DowelAt(50, 0.4)}, shell_, 1);
+      ProjectOntoShell(std::vector<Dowel>{DowelAt(50, 0.4)}, shell_, MeshQuery(shell_), 1);
   EXPECT_LE(projected.dowels_on_shell[0].depth_mm, 0.4 + 1e-9);
 }
 
@@ -60,7 +60,7 @@ TEST_F(ShellDowelsTest, PressedInADowelReachesOutAsFarAsAsked) {
   const std::vector<Dowel> dowels = {DowelAt(40, 6), DowelAt(50, 8, {-1, 1, 0})};
   const TriMesh bone = testing::SphereMesh({0, 0, 0}, 40, 120);
   const TriMesh pressed = IndentShell(shell_, dowels, bone, 3);
-  const ProjectedDowels projected = ProjectOntoShell(dowels, pressed, 1);
+  const ProjectedDowels projected = ProjectOntoShell(dowels, pressed, MeshQuery(pressed), 1);
   EXPECT_NEAR(projected.dowels_on_shell[0].depth_mm, 3, 0.1);
   EXPECT_NEAR(projected.dowels_on_shell[1].depth_mm, 8, 0.1);
   EXPECT_LT((projected.dowels_on_shell[0].Tip() - dowels[0].Tip()).norm(), 0.1);

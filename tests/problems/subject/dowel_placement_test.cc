@@ -222,8 +222,8 @@ TEST(AveragedNormal, IsTheSameOnACoarseMeshAndOnAFineOne) {
     return best;
   };
   const TriMesh coarse = Roof(0.5, 2), fine = Roof(0.5, 100);
-  const Vec3 a = AveragedNormal(coarse, nearest(coarse), ball);
-  const Vec3 b = AveragedNormal(fine, nearest(fine), ball);
+  const Vec3 a = AveragedNormal(coarse, MeshQuery(coarse), nearest(coarse), ball);
+  const Vec3 b = AveragedNormal(fine, MeshQuery(fine), nearest(fine), ball);
   EXPECT_LT(DegreesBetween(a, b), 1);
   EXPECT_GT(DegreesBetween(b, Vec3(0, 0, 1)), 5);  // more of the right side is within reach
 }

@@ -305,7 +305,7 @@ TEST_P(PhantomLikePeople, SitesLieOnTheBoneAndFaceAsItDoesAround) {
     const MeshPoint on_bone = bone.Closest(s.base);
     EXPECT_LT(on_bone.distance_mm, 0.3) << s.site;
     const Vec3 mean =
-        AveragedNormal(fine.skull, on_bone.triangle, {.center = s.base, .radius_mm = 3});
+        AveragedNormal(fine.skull, bone, on_bone.triangle, {.center = s.base, .radius_mm = 3});
     EXPECT_GT(s.normal.dot(mean), std::cos(0.35)) << s.site;
     EXPECT_NEAR(s.normal.norm(), 1, 1e-12);
   }

@@ -72,6 +72,25 @@ TEST(MeshQuery, APointIsTheWeightedSumOfItsTrianglesCorners) {
 }
 
 // A mesh that is crushed to a point, beside one triangle.
+TEST(MeshQuery, TrianglesNearMissNoneWithinTheDistance) {
+  const TriMesh sphere = SphereMesh({1, 2, 3}, 10, 32);
+  const MeshQuery query(sphere);
+  for (const double distance_mm : {0.0, 0.3, 4.0, 50.0}) {
+    const Vec3 p(8, 2, 10);
+    const std::vector<int> near = query.TrianglesNear(p, distance_mm);
+    EXPECT_TRUE(std::ranges::is_sorted(near));
+    for (int t = 0; t < static_cast<int>(sphere.triangles.size()); ++t) {
+      const auto& [a, b, c] = sphere.triangles[t];
+      const TrianglePoint closest =
+          ClosestPointOnTriangle(p, sphere.points[a], sphere.points[b], sphere.points[c]);
+      if ((closest.position - p).norm() <= distance_mm) {
+        EXPECT_TRUE(std::ranges::binary_search(near, t)) << t;
+      }
+    }
+  }
+  EXPECT_LT(query.TrianglesNear({8, 2, 10}, 0.3).size(), 40u);  // most are left out
+}
+
 TEST(MeshQuery, ManyTrianglesAtOnePlace) {
   TriMesh mesh{.points = {{1, 2, 3}, {11, 2, 3}, {1, 12, 3}}, .triangles = {{0, 1, 2}}};
   mesh.triangles.resize(200000, {0, 0, 0});
