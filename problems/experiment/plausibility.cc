@@ -16,6 +16,7 @@
 #include <optional>
 #include <utility>
 
+#include "problems/experiment/outer_bone.h"
 #include "problems/subject/sites.h"
 #include "problems/subject/tissue_table.h"
 #include "surfaces/base/json_text.h"
@@ -52,69 +53,12 @@ std::string NearWords(const Vec3& worst, const std::optional<SkullSites>& pose) 
 // Bone outside the face
 // ---------------------------------------------------------------------------------------------
 
-struct BoneSample {
-  Vec3 position, normal;
-  double outside_mm = kNaN;  // of the face; NaN: not outer bone, or not under the face
-};
-
-// Samples of the observed bone. Each stands for the same area.
-std::vector<BoneSample> SampleBone(const FaceToJudge& in, double area_mm2) {
-  std::vector<BoneSample> samples;
-  double due = area_mm2 / 2;  // area until the next sample
-  for (std::size_t t = 0; t < in.skull.triangles.size(); ++t) {
-    if (!in.origin.empty() && in.origin[t] != BoneOrigin::kObserved) {
-      continue;
-    }
-    const Vec3 vector = TriangleAreaVector(in.skull, in.skull.triangles[t]);
-    const double area = vector.norm();
-    due -= std::isfinite(area) ? area : 0;
-    while (due < 0) {
-      samples.push_back({TriangleCentroid(in.skull, in.skull.triangles[t]), vector / area});
-      due += area_mm2;
-    }
-  }
-  return samples;
-}
-
-std::vector<bool> BorderVertices(const TriMesh& mesh) {
-  std::vector<bool> border(mesh.points.size(), false);
-  for (const MeshEdge& edge : BorderEdges(mesh)) {
-    border[edge[0]] = border[edge[1]] = true;
-  }
-  return border;
-}
-
-// The distance of a place outside the face; NaN beyond the face's border.
-double OutsideFace_mm(const Vec3& p, const MeshQuery& query, const Tessellation& face,
-                      const std::vector<bool>& border) {
-  constexpr double kOnEdge = 1e-9;  // weight of a corner
-  const MeshPoint at = query.Closest(p);
-  const Triangle& triangle = face.mesh.triangles[at.triangle];
-  bool beyond = true;
-  Vec3 normal = Vec3::Zero();
-  for (int k = 0; k < 3; ++k) {
-    beyond = beyond && (at.weights[k] < kOnEdge || border[triangle[k]]);
-    normal += at.weights[k] * face.normals[triangle[k]];
-  }
-  return beyond ? kNaN : std::copysign(at.distance_mm, normal.dot(p - at.position));
-}
-
-// The samples of outer bone under the face, the farthest outside first. Bone is outer if the
-// skull's shell lies close to it and faces the same way.
-std::vector<BoneSample> OuterBone(const FaceToJudge& in, double area_mm2,
-                                  const RunContext& context) {
-  constexpr double kShell_mm = 3, kLeastCosine = 0.3;
-  std::vector<BoneSample> samples = SampleBone(in, area_mm2);
-  const MeshQuery shell(in.shell), face(in.face.mesh);
-  const std::vector<bool> border = BorderVertices(in.face.mesh);
-  ParallelFor(samples.size(), context.threads, 256, [&](std::size_t n) {
-    BoneSample& sample = samples[n];
-    const MeshPoint at = shell.Closest(sample.position);
-    const Vec3 out = TriangleAreaVector(in.shell, in.shell.triangles[at.triangle]);
-    if (at.distance_mm <= kShell_mm && out.dot(sample.normal) > kLeastCosine * out.norm()) {
-      sample.outside_mm = OutsideFace_mm(sample.position, face, in.face, border);
-    }
-  });
+// The samples of outer bone under the face, the farthest outside first.
+std::vector<BoneSample> BoneUnderFace(const FaceToJudge& in, double area_mm2,
+                                      const RunContext& context) {
+  std::vector<BoneSample> samples =
+      SampleOuterBone(in.skull, in.origin, in.shell, MeshQuery(in.shell), area_mm2, context);
+  MeasureOutside(in.face, samples, context);
   std::erase_if(samples, [](const BoneSample& s) { return std::isnan(s.outside_mm); });
   std::ranges::stable_sort(samples, std::greater(), &BoneSample::outside_mm);
   return samples;
@@ -380,7 +324,7 @@ class Judge {
     constexpr double kSamples = 40000;     // one for 5 to 10 mm2 of a skull
     constexpr double kLeastArea_mm2 = 50;  // of bone that lies as far outside as is reported
     const double area_mm2 = std::max(Area(in_.skull), 1.0) / kSamples;
-    const std::vector<BoneSample> bone = OuterBone(in_, area_mm2, context_);
+    const std::vector<BoneSample> bone = BoneUnderFace(in_, area_mm2, context_);
     const std::string remedy =
         "the face cuts into the skull; look at the landmarks, the depths and the directions of the "
         "depth markers there";
