@@ -36,7 +36,8 @@ void RunCoverage();
 
 // Files of heights over x and y, with nothing chosen, against MBA at its best at places that were
 // kept back. A set is NAME.csv.gz with the points and NAME.truth.npz, whose array xyz has the
-// places and heights that were kept back.
+// places and heights that were kept back. A set whose points lie at kept places too is also scored
+// without these points.
 void RunFiles(const std::string& folder);
 
 // Points whose (u,v) are off, until the surface is where it should be.

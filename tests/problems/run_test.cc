@@ -73,7 +73,7 @@ std::map<std::string, std::string> FilesOfRun(const Experiment& experiment, cons
   return files;
 }
 
-TEST(Run, ThePhantomsImplicitFaceIsWithinAMillimetreOfTheTruth) {
+TEST(Run, ThePhantomsImplicitFaceIsWithinAMillimetreOfTheTruthThorough) {
   const Experiment experiment = ReadConfig<Experiment>(
       kConfigs / "phantom.yaml",
       std::vector<std::string>{"implicit.resolution=70", "template.max_level=2",
@@ -109,7 +109,7 @@ std::string TemplateOfIctFiles() {
 
 // The skull of the reference is the subject's under an affine map. The plate undoes exactly that
 // map.
-TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjects) {
+TEST(Run, AReferencesSkinFollowsItsSkullToTheSubjectsThorough) {
   const std::string files = TemplateOfIctFiles();
   const RunResult placed = problems::Run(SmallPhantom({files, "face=placed"}), {});
   const Similarity& face_from_template = placed.face_from_template;
@@ -161,7 +161,7 @@ std::string SkullOfMeanPerson() {
   return csv;
 }
 
-TEST(Run, WithoutLandmarksTheReferenceIsTheMeanPerson) {
+TEST(Run, WithoutLandmarksTheReferenceIsTheMeanPersonThorough) {
   const testing::ScratchFolder folder;
   WriteFileAtomically(folder.Path() / "skull.csv", SkullOfMeanPerson());
   const RunResult by_file =
@@ -197,7 +197,7 @@ Experiment PhantomWithPrior(const std::vector<std::string>& more) {
   return SmallPhantom(overrides);
 }
 
-TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIs) {
+TEST(Run, ThePriorsFaceIsNearTheTipsAndSaysHowSureItIsThorough) {
   const Experiment experiment = PhantomWithPrior({});
   const RunResult result = problems::Run(experiment, {});
   ASSERT_TRUE(result.prior && result.uncertainty);
@@ -225,7 +225,7 @@ TEST(Run, APriorsFaceIsMeasuredWhereItMeetsTheDowels) {
               HasSubstr("sites.g.uv: `face: prior` has its own place for the landmark g"));
 }
 
-TEST(Run, EditsChangeTheFacesDrawnBesideAsTheDrawItself) {
+TEST(Run, EditsChangeTheFacesDrawnBesideAsTheDrawItselfThorough) {
   const ScratchFolder folder;
   WriteFileAtomically(folder / "mine.yaml", "edits: [{level: 0, i: 3, j: 3, offset: [0, 0, 6]}]\n");
   const std::string edits = "edits=" + (folder / "mine.yaml").string();
@@ -339,7 +339,7 @@ double Strain(const RunResult& result) {
       .rms_strain;
 }
 
-TEST(Run, ATermIsObeyedTheMoreItWeighs) {
+TEST(Run, ATermIsObeyedTheMoreItWeighsThorough) {
   StageCache cache(16);
   const auto run = [&](const std::string& term) { return RunWithTerm(term, cache); };
   // It does nothing here, but seeds have anchors.
@@ -387,7 +387,7 @@ TEST(Run, SaysWhatItDidToTheFeatures) {
   }
 }
 
-TEST(Run, ATemplateFromAFileGivesTheSameFaceToTheBit) {
+TEST(Run, ATemplateFromAFileGivesTheSameFaceToTheBitThorough) {
   const ScratchFolder folder;
   const Experiment formula = SmallPhantom();
   const FileTemplate files = WriteTemplate(folder.Path(), LoadTemplate(formula.face_template));
@@ -442,7 +442,7 @@ Experiment WithoutCheek(const fs::path& folder) {
                            (kConfigs / "tables/rhine_caucasoid.yaml").string() + "}"});
 }
 
-TEST(Run, MirroredBoneIsToldDrawnAndKeptToTheFace) {
+TEST(Run, MirroredBoneIsToldDrawnAndKeptToTheFaceThorough) {
   const ScratchFolder folder;
   const auto files = FilesOfRun(WithoutCheek(folder.Path()), folder / "run", 2);
   const auto result = nlohmann::json::parse(files.at("result.json"));
@@ -529,7 +529,7 @@ bool IsOfReport(const std::string& name) {
   return name == "report.html" || name == "scene.json" || name.starts_with("pictures/");
 }
 
-TEST(Run, WithoutAReportTheOtherFilesAreTheSame) {
+TEST(Run, WithoutAReportTheOtherFilesAreTheSameThorough) {
   const ScratchFolder folder;
   const RunResult result = problems::Run(SmallPhantom(), {});
   std::map<bool, std::map<std::string, std::string>> files;

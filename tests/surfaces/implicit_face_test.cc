@@ -41,7 +41,7 @@ TEST(ImplicitFace, OverASphereItIsASphereClosedAndManifold) {
 }
 
 // Without the solid inside, most corners of the grid would miss the layer of tissue.
-TEST(ImplicitFace, TissueMuchThinnerThanACellMakesOneSheetWithoutHoles) {
+TEST(ImplicitFace, TissueMuchThinnerThanACellMakesOneSheetWithoutHolesThorough) {
   const TriMesh sphere = SphereMesh({3, 2, 1}, 80, 40);
   for (const Emitter& emitter : {Emitter(FlatEmitter{}), Emitter(ThesisEmitter{.decay = 15})}) {
     const ImplicitFace face =

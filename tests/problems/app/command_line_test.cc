@@ -111,7 +111,7 @@ TEST_F(CommandLine, HelpAndVersionExitWithZero) {
   EXPECT_EQ(Call("walk").code, 2);
 }
 
-TEST_F(CommandLine, RunWritesAReportAndPrintsItsPath) {
+TEST_F(CommandLine, RunWritesAReportAndPrintsItsPathThorough) {
   const Outcome outcome = Call("run " + kConfigs + "/phantom.yaml --out out" + kQuick);
   EXPECT_EQ(outcome.code, 0) << outcome.err;
   EXPECT_EQ(outcome.err, "");
@@ -340,7 +340,7 @@ TEST_F(CommandLine, AMistypedWordGetsASuggestion) {
 
 // Calls every command that reads a file with files of the wrong kind. Each message must come from
 // the program, not from a library.
-TEST_F(CommandLine, MessagesDoNotQuoteLibraries) {
+TEST_F(CommandLine, MessagesDoNotQuoteLibrariesThorough) {
   Write("mesh.ply", EncodeMesh(testing::SphereMesh({0, 0, 0}, 82, 10), ".ply"));
   Write("empty.json", "");
   Write("map.json", "{}");
@@ -448,7 +448,7 @@ TEST_F(CommandLine, ReportRefusesAFolderThatIsNotARun) {
 }
 
 // A killed run leaves no folder of its name. The next run removes its temporary folder.
-TEST_F(CommandLine, AKilledRunLeavesNoFileAndTheNextOneCleansUp) {
+TEST_F(CommandLine, AKilledRunLeavesNoFileAndTheNextOneCleansUpThorough) {
   const std::string config = kConfigs + "/phantom.yaml", out = (folder_ / "out").string();
   const fs::path part = folder_ / ".out.semblance-part";
   const pid_t child = ::fork();

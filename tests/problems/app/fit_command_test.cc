@@ -428,7 +428,7 @@ TEST_F(FitCommand, AFaultIsOneLineAndNothingIsWritten) {
 }
 
 // Every plan, solver and extra on one tube with given (u,v).
-TEST_F(FitCommand, ATubeIsFittedByEveryPlan) {
+TEST_F(FitCommand, ATubeIsFittedByEveryPlanThorough) {
   Write("head.csv", UvCsv(Scattered(HeadPoint, 3000, 1e-3, 1)));
   const std::string level_2 = "fit.plan={type: listed, schedule: [{level: 2}]}";
   const std::vector<std::pair<std::string, std::vector<std::string>>> ways = {

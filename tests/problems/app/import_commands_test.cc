@@ -76,7 +76,7 @@ TEST_F(ImportCommands, AHeadThatCannotBeMadeLeavesNoFolder) {
   }
 }
 
-TEST_F(ImportCommands, AHeadMayHaveRoughBone) {
+TEST_F(ImportCommands, AHeadMayHaveRoughBoneThorough) {
   const auto bytes = [&](const char* path) { return ReadFileBytes(folder_ / path); };
   ASSERT_EQ(
       CallProgram(folder_, "phantom --out rough --head like_people --pixel-mm 2.5 --slice-mm 3")

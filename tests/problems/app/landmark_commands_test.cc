@@ -75,7 +75,7 @@ TEST_F(LandmarkCommands, AProposalIsMarkedAndReplacesFilesOnlyWithForce) {
   EXPECT_THAT(again.err, HasSubstr("it exists"));
 }
 
-TEST_F(LandmarkCommands, AProposalOnARasSkullIsTurnedIfTheFileCannotStateRas) {
+TEST_F(LandmarkCommands, AProposalOnARasSkullIsTurnedIfTheFileCannotStateRasThorough) {
   TriMesh skull = MakePhantom({.random_seed = 4, .rings = 40}).skull;
   for (Vec3& p : skull.points) {
     p = ToLps(p, Axes::kRas);

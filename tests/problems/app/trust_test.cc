@@ -240,7 +240,7 @@ TEST_F(Trust, InvalidNamesGiveOneLineOfError) {
   }
 }
 
-TEST_F(Trust, AStudysFilesMayHoldAnything) {
+TEST_F(Trust, AStudysFilesMayHoldAnythingThorough) {
   const std::vector<std::string> contents = {
       "",
       "{",
@@ -312,7 +312,7 @@ TEST_F(Trust, LackOfMemoryBeforeMainIsReportedToo) {
   }
 }
 
-TEST_F(Trust, AStudyContinuesAfterATrialRunsOutOfMemory) {
+TEST_F(Trust, AStudyContinuesAfterATrialRunsOutOfMemoryThorough) {
   if (!kMemoryHasLimits) {
     GTEST_SKIP();
   }

@@ -214,7 +214,7 @@ TEST(ExtraDowels, WithoutSeedsTheFitHasTheDowelsAlone) {
   EXPECT_EQ(result.fit.dowel_rms_mm, result.fit.point_rms_mm);
 }
 
-TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeld) {
+TEST(ExtraDowels, AUvSetByHandIsTheFitsAndStaysWhereItIsHeldThorough) {
   const std::vector<std::string> quick = {"seeds.level=1", "uncertainty.sigma=false"};
   StageCache cache(8);
   const auto uv_of = [&](const std::string& sites) {

@@ -56,7 +56,7 @@ const RunResult& SpringRun() {
   return run;
 }
 
-TEST(SpringFace, TheNetComesToTheDepthAndStaysAtTheTips) {
+TEST(SpringFace, TheNetComesToTheDepthAndStaysAtTheTipsThorough) {
   const RunResult& springs = SpringRun();
   const RunResult start = RunSpringPhantom("{type: thin_plate, stiffness_mm: 0}");
   ASSERT_TRUE(springs.usable());
@@ -72,7 +72,7 @@ TEST(SpringFace, TheNetComesToTheDepthAndStaysAtTheTips) {
   EXPECT_LT(level.terms[1].after, level.terms[1].before) << "depth";
 }
 
-TEST(SpringFace, TheNumberOfThreadsChangesNoByte) {
+TEST(SpringFace, TheNumberOfThreadsChangesNoByteThorough) {
   const RunResult &one = SpringRun(), three = RunSpringPhantom("springs", 3);
   EXPECT_EQ(one.fit.surface.Offsets(), three.fit.surface.Offsets());
   EXPECT_EQ(one.fit.surface.Net(0).vertices, three.fit.surface.Net(0).vertices);

@@ -37,7 +37,7 @@ double MedianSigma(const RunResult& result) { return result.uncertainty->median_
 
 // The exact face of phantoms lies in the 90 % interval of the recovered one on nine tenths of its
 // area.
-TEST(Uncertainty, NinetyPercentIntervalsHoldNineTenthsOfThePhantomsFaces) {
+TEST(Uncertainty, NinetyPercentIntervalsHoldNineTenthsOfThePhantomsFacesThorough) {
   double share = 0, area = 0;
   for (const int random_seed : {1, 2}) {
     const RunResult& result = RunPhantom({fmt::format("subject.random_seed={}", random_seed)});
@@ -69,7 +69,7 @@ TEST(Uncertainty, HasOnlyTheRequestedParts) {
   EXPECT_NE(two.uncertainty->samples[0].Offsets(), two.uncertainty->samples[1].Offsets());
 }
 
-TEST(Uncertainty, ATermThatIsLeftOutIsNoted) {
+TEST(Uncertainty, ATermThatIsLeftOutIsNotedThorough) {
   const RunResult& result =
       RunPhantom({"fit.terms=[points, smoothness, membrane, {type: symmetry, weight: 0.1}]"});
   EXPECT_THAT(result.uncertainty->left_out, ::testing::ElementsAre("symmetry"));

@@ -57,7 +57,7 @@ std::vector<double> Hits(const TriMesh& mesh, const Vec3& from, const Vec3& alon
   return ways;
 }
 
-TEST(PersonPhantom, TheSeedAloneDecides) {
+TEST(PersonPhantom, TheSeedAloneDecidesThorough) {
   const PersonPhantom again = Make(1, 1), other = Make(2, 2);
   EXPECT_TRUE(SamePoints(First().skull, again.skull));
   EXPECT_TRUE(SamePoints(First().true_skin, again.true_skin));

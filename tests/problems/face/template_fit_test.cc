@@ -113,7 +113,7 @@ std::string FaultOf(const TriMesh& head, const SkinLandmarks& landmarks) {
   return "accepted";
 }
 
-TEST(TemplateFit, AnotherHeadIsMetWithItsSitesInTheirPlacesAndWithoutFolds) {
+TEST(TemplateFit, AnotherHeadIsMetWithItsSitesInTheirPlacesAndWithoutFoldsThorough) {
   const TemplateFit& fit = FitOfHead();
   EXPECT_TRUE(fit.usable);
   EXPECT_TRUE(fit.met);
@@ -132,7 +132,7 @@ TEST(TemplateFit, AnotherHeadIsMetWithItsSitesInTheirPlacesAndWithoutFolds) {
   }
 }
 
-TEST(TemplateFit, AnInnerWallAndAHoleDoNotMatterBeyondTheirPlace) {
+TEST(TemplateFit, AnInnerWallAndAHoleDoNotMatterBeyondTheirPlaceThorough) {
   TriMesh head = Head();
   std::vector<bool> keep;
   const Vec3 cheek_point = MeshQuery(head).Closest(OfAnother({-50, 22, -50})).position;
@@ -155,7 +155,7 @@ TEST(TemplateFit, AnInnerWallAndAHoleDoNotMatterBeyondTheirPlace) {
   EXPECT_LT(bridge.distance_mm, 1.5);
 }
 
-TEST(TemplateFit, TheThirtyTwoSitesAloneWillDo) {
+TEST(TemplateFit, TheThirtyTwoSitesAloneWillDoThorough) {
   SkinLandmarks sites = LandmarksOf();
   std::erase_if(sites.points,
                 [](const SkinLandmark& l) { return !TemplateSites().contains(l.code); });
@@ -164,7 +164,7 @@ TEST(TemplateFit, TheThirtyTwoSitesAloneWillDo) {
   EXPECT_EQ(fit.folds, 0);
 }
 
-TEST(TemplateFit, TheNumberOfThreadsDoesNotMatterAndTheFilesGiveTheSameFace) {
+TEST(TemplateFit, TheNumberOfThreadsDoesNotMatterAndTheFilesGiveTheSameFaceThorough) {
   const TemplateFit one = FitOf(Head(), LandmarksOf(), 1);
   const TemplateFit& two = FitOfHead();
   EXPECT_EQ(HSplineToJson(one.face.surface), HSplineToJson(two.face.surface));

@@ -150,7 +150,7 @@ TEST(MeasurePopulation, ContinuesWhereItStoppedAndShardsGiveTheSameBytes) {
 RunContext OnThreads(int threads) { return {.on_event = {}, .stop_token = {}, .threads = threads}; }
 
 // A phantom is no human skull, so the landmarks come from another phantom.
-TEST(MeasurePopulation, OfVolumesInAFolderGoesOnAfterBadOnesAndShardsGiveTheSameTable) {
+TEST(MeasurePopulation, OfVolumesInAFolderGoesOnAfterBadOnesAndShardsGiveTheSameTableThorough) {
   const ScratchFolder folder;
   fs::create_directories(folder / "heads/d");
   for (const auto& [file, seed] : {std::pair{"a.nrrd", 1}, {"b.nrrd", 2}, {"c.nrrd", 3}}) {

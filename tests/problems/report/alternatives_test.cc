@@ -130,7 +130,7 @@ TEST(Alternatives, TheirInputsAreCheckedAndReportedByName) {
               Contains(AllOf(HasSubstr("alternative 'lean': "), HasSubstr("no depth for 2"))));
 }
 
-TEST(Alternatives, LieBelowTheRunAndListLeftOutSites) {
+TEST(Alternatives, LieBelowTheRunAndListLeftOutSitesThorough) {
   const Experiment experiment =
       SmallPhantom({"alternatives=[{name: lean, set: [\"tissue.build=emaciated\"]}]"});
   const testing::ScratchFolder scratch;
@@ -154,7 +154,7 @@ TEST(Alternatives, LieBelowTheRunAndListLeftOutSites) {
   }
 }
 
-TEST(Alternatives, SitesWithoutADepthInTheRunsTableAreLeftOut) {
+TEST(Alternatives, SitesWithoutADepthInTheRunsTableAreLeftOutThorough) {
   const Experiment experiment =
       SmallPhantom({"tissue.build=emaciated", "face=placed",
                     "alternatives=[{name: same}, {name: normal, set: [\"tissue.build=normal\"]}]"});

@@ -93,7 +93,7 @@ std::vector<std::string> NamesOf(const Json& document, const Json& nodes) {
   return names;
 }
 
-TEST_F(ExportFile, ARunBecomesAGlbWithSkullFaceAndDowels) {
+TEST_F(ExportFile, ARunBecomesAGlbWithSkullFaceAndDowelsThorough) {
   const fs::path run = WriteSmallRun();
   const std::string ply = ReadFileBytes(run / "face.ply");
   pugi::xml_document vtp;

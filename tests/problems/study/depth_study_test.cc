@@ -115,7 +115,7 @@ TEST(DepthStudy, MostErrorsLieWithinTheSdOfKriging) {
 }
 
 // The 90 % interval of every scheme, stated or learned, contains most true depths.
-TEST(DepthStudy, TheIntervalsOfEverySchemeHoldMostDepths) {
+TEST(DepthStudy, TheIntervalsOfEverySchemeHoldMostDepthsThorough) {
   for (const char* scheme : {"auto", "barycentric", "natural_neighbour", "biharmonic"}) {
     const double within =
         Measured({fmt::format("interp={}", scheme)}).truth->along_direction.scores.coverage_90;

@@ -63,7 +63,7 @@ class StudyTest : public ::testing::Test {
   ScratchFolder folder_;
 };
 
-TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
+TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptionsThorough) {
   const StudyPlan plan = Plan(kSmall);
   CopySmall("one");
   const auto one = StudyFiles(folder_ / "one");
@@ -84,7 +84,7 @@ TEST_F(StudyTest, SameBytesForAnyJobsShardsAndInterruptions) {
 }
 
 // A changed study gives the same trials and tables as if it had never been different.
-TEST_F(StudyTest, AChangedStudyKeepsItsTrialsAndGivesTheSameTables) {
+TEST_F(StudyTest, AChangedStudyKeepsItsTrialsAndGivesTheSameTablesThorough) {
   CopySmall("run");
   const StudyPlan changed = Plan(
       "subjects:\n  - {name: b, set: {subject.random_seed: 2}}\n"
@@ -116,7 +116,7 @@ TEST_F(StudyTest, TrialsThatLackKeptFilesRunAgain) {
 }
 
 // Whatever is damaged in a trial, the next call gives the bytes of an undamaged study.
-TEST_F(StudyTest, DamagedTrialsRunAgain) {
+TEST_F(StudyTest, DamagedTrialsRunAgainThorough) {
   const StudyPlan plan = Plan(
       "subjects: [{name: a}]\ngrid: {interp: [nearest, {type: mean}]}\n"
       "metric: implicit_face.rms_mm\nkeep: view\n");
@@ -260,7 +260,7 @@ TEST_F(StudyTest, ADepthStudySharesNoTrialWithAFaceStudy) {
 }
 
 // Every number of a real result is a metric that is known before the run.
-TEST_F(StudyTest, TheMetricsOfARunAreKnownBeforeIt) {
+TEST_F(StudyTest, TheMetricsOfARunAreKnownBeforeItThorough) {
   for (const auto& [job, text] :
        {std::pair{StudyJob::kFace, ""},
         std::pair{StudyJob::kDepth, "job: depth\nmetric: depth_truth.tips.rms_mm\n"}}) {
@@ -354,7 +354,7 @@ TEST_F(StudyTest, ResultsEqualThoseOfSingleRuns) {
   }
 }
 
-TEST_F(StudyTest, TwelveFitsShareOneImplicitFace) {
+TEST_F(StudyTest, TwelveFitsShareOneImplicitFaceThorough) {
   const StudyPlan one = Plan("list: [{fit.plan.schedule: [{level: 0, fraction: 0.05}]}]\n");
   const StudyPlan twelve = Plan(
       "zip: {fit.plan.schedule: [[{level: 0, fraction: 0.1}], [{level: 0, fraction: 0.2}],\n"

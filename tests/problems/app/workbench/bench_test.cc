@@ -151,7 +151,7 @@ void ExpectOwnFeatureChangesNothing(Bench& bench) {
 }
 
 // The test of the page (workbench_page.py) compares every byte of the folder.
-TEST_F(WorkbenchBench, ARunOfTheFolderGivesTheSameFaceWithItsEdits) {
+TEST_F(WorkbenchBench, ARunOfTheFolderGivesTheSameFaceWithItsEditsThorough) {
   Bench bench(Options());
   RemoveSkin(bench);
   bench.Apply("set a depth", [](BenchState s) { return ChangeSetting(s, "tissue.set_mm.g", "9"); });
@@ -193,7 +193,7 @@ void Touch(const fs::path& file) { WriteFileAtomically(file, ReadFileBytes(file)
 
 // For each kind of input: changed while the workbench runs, changed back, and changed between two
 // workbenches.
-TEST_F(WorkbenchBench, NotesMakeTheReportStaleButNotTheFace) {
+TEST_F(WorkbenchBench, NotesMakeTheReportStaleButNotTheFaceThorough) {
   Bench bench(Options());
   RemoveSkin(bench);
   RunUntilEnd(bench);
@@ -249,7 +249,7 @@ TEST_F(WorkbenchBench, AFileThatChangesOnTheDiskMakesTheFaceStale) {
 }
 
 // The second run must not use intermediate results of the former contents.
-TEST_F(WorkbenchBench, ARunAfterAChangeOfAFileIsThatOfTheChangedFile) {
+TEST_F(WorkbenchBench, ARunAfterAChangeOfAFileIsThatOfTheChangedFileThorough) {
   Bench bench(Options());
   RemoveSkin(bench);
   RunUntilEnd(bench);
@@ -263,7 +263,7 @@ TEST_F(WorkbenchBench, ARunAfterAChangeOfAFileIsThatOfTheChangedFile) {
 }
 
 // A person opens it to correct the points, or to repair the file.
-TEST_F(WorkbenchBench, ASkullThatNoLongerFitsOrCannotBeReadStillOpens) {
+TEST_F(WorkbenchBench, ASkullThatNoLongerFitsOrCannotBeReadStillOpensThorough) {
   const fs::path skull = folder_ / "bench/subject/skull.ply";
   {
     Bench bench(Options());
@@ -302,7 +302,7 @@ TEST_F(WorkbenchBench, AChangeDuringARunDiscardsItsResult) {
 }
 
 // As two pages do at the same moment.
-TEST_F(WorkbenchBench, ManyThreadsMayStartAJobAtOnce) {
+TEST_F(WorkbenchBench, ManyThreadsMayStartAJobAtOnceThorough) {
   Bench bench(Options());
   RemoveSkin(bench);
   for (int round = 0; round < 2; ++round) {
@@ -409,7 +409,7 @@ TEST_F(WorkbenchBench, AFullVariantIsTheRunOfItsBuild) {
   }
 }
 
-TEST_F(WorkbenchBench, ThePreviewOfAPullPredictsItsResult) {
+TEST_F(WorkbenchBench, ThePreviewOfAPullPredictsItsResultThorough) {
   Bench bench(Options());
   RemoveSkin(bench);
   Pull pull{.level = 1, .reach = 2, .mirror = true};

@@ -102,7 +102,7 @@ double StrainOfFeatures(const std::string& rule, StageCache& cache) {
 // The coarse level strains features, because it has too few vertices to bend only around them.
 // Their finer vertices undo some of that, the less the more they are held
 // (docs/explanation/fit.md).
-TEST(FeatureDistortion, TheMoreTheirOffsetsAreHeldTheMoreFeaturesAreStrained) {
+TEST(FeatureDistortion, TheMoreTheirOffsetsAreHeldTheMoreFeaturesAreStrainedThorough) {
   StageCache cache(8);
   const auto strain = [&](const char* rule) { return StrainOfFeatures(rule, cache); };
   const double free = strain("free"), weighted = strain("weighted"), frozen = strain("frozen"),

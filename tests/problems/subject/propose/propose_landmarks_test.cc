@@ -108,7 +108,7 @@ TEST(ProposeLandmarks, MarkersPointOutwardsInTheFrameOfTheSkull) {
   }
 }
 
-TEST(ProposeLandmarks, DoesNotDependOnThreads) {
+TEST(ProposeLandmarks, DoesNotDependOnThreadsThorough) {
   const Proposal &one = PlainProposal(), two = ProposeAt({}, 2);
   ASSERT_EQ(one.sites.size(), two.sites.size());
   for (std::size_t k = 0; k < one.sites.size(); ++k) {
