@@ -98,7 +98,7 @@ constexpr std::size_t kPatchesPerPoint = 4;  // of a tested level; more take tim
 // closer weight. The score is flat near its minimum.
 constexpr double kCoarseFactor = 4, kFineFactor = 2;
 // Held-out error, relative to the extent, that is round-off: mean squares are differences of sums.
-constexpr double kRounding = 1e-8;
+constexpr double kRoundingOfPoints = 1e-8;
 
 [[noreturn]] void RefuseFit(const std::string& what) {
   throw InputError("fit: plan auto: " + what);
@@ -190,7 +190,7 @@ class NestedFitter {
         context_(context),
         points_(std::move(points)),
         solve_(points_, MeanLengths(start)),
-        rounding_mm_(kRounding * MeanLengths(start).norm()),
+        rounding_mm_(kRoundingOfPoints * MeanLengths(start).norm()),
         space_(start.shape()),
         cap_(FinestAllowed(plan, start.shape())),
         held_(ChooseHeldOut(points_)),
@@ -942,8 +942,8 @@ void UpdateReport(const HSplineSurface& surface, const ScatteredPoints& points,
   if (after > kClearly * kClearly * before) {
     report.held_out_rms_mm = kNaN;
     report.limited_by_density = false;
-    report.met_to_rounding =
-        report.met_to_rounding && report.noise_mm <= kRounding * MeanLengths(surface).norm();
+    report.met_to_rounding = report.met_to_rounding &&
+                             report.noise_mm <= kRoundingOfPoints * MeanLengths(surface).norm();
   }
 }
 

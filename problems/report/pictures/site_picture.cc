@@ -10,6 +10,7 @@
 #include "problems/report/pictures/lighting.h"
 #include "problems/report/pictures/pictures.h"
 #include "problems/subject/phantom.h"
+#include "problems/subject/propose/mean_skull.h"
 #include "problems/subject/sites.h"
 #include "surfaces/base/encoding.h"
 #include "surfaces/base/error.h"
@@ -59,13 +60,21 @@ Numbered MarkOf(const Site& site, const Vec3& point, const Camera& camera, View 
           .number = site.number};
 }
 
+std::map<std::string, Vec3> PlacesOf(const ReferenceHead& head) {
+  std::map<std::string, Vec3> places;
+  for (const SitePoint& site : head.sites) {
+    places[site.site] = site.point;
+  }
+  return places;
+}
+
 // The marks of the visible sites. A number that would touch a former one moves to the other side.
-std::vector<Numbered> MarksSeenFrom(View view, const Phantom& phantom, const Camera& camera) {
+std::vector<Numbered> MarksSeenFrom(View view, const ReferenceHead& head, const Camera& camera) {
+  const std::map<std::string, Vec3> places = PlacesOf(head);
   std::vector<Numbered> marks;
-  for (std::size_t k = 0; k < phantom.sites.size(); ++k) {
-    const Site& site = StandardSites()[k];
+  for (const Site& site : StandardSites()) {
     if (view == View::kFront || site.side != Side::kRight) {
-      Numbered mark = MarkOf(site, phantom.sites[k].base, camera, view);
+      Numbered mark = MarkOf(site, places.at(site.code), camera, view);
       mark.left ^= std::ranges::any_of(
           marks, [&](const Numbered& former) { return NumbersTouch(former, mark); });
       marks.push_back(mark);
@@ -75,10 +84,10 @@ std::vector<Numbered> MarksSeenFrom(View view, const Phantom& phantom, const Cam
 }
 
 // One view as a group of the drawing, its left edge at x, with a caption below.
-std::string ViewSvg(View view, const char* caption, int x, const Phantom& phantom,
+std::string ViewSvg(View view, const char* caption, int x, const ReferenceHead& head,
                     const Box3& region, int threads) {
   const Camera camera = CameraFor(view, region, static_cast<double>(kSiteWidth) / kSiteHeight);
-  const Image image = Render({{SkullObject(phantom.skull)}}, camera,
+  const Image image = Render({{SkullObject(head.shell.mesh)}}, camera,
                              {.width = kSiteWidth, .height = kSiteHeight}, threads);
   std::string svg = fmt::format(
       "<g transform=\"translate({} 0)\">\n<image width=\"{}\" height=\"{}\" "
@@ -86,7 +95,7 @@ std::string ViewSvg(View view, const char* caption, int x, const Phantom& phanto
       "text-anchor=\"middle\">{}</text>\n",
       x, kSiteWidth, kSiteHeight, Base64(EncodePng(image)), kSiteWidth / 2, kSiteHeight + 22,
       caption);
-  for (const Numbered& mark : MarksSeenFrom(view, phantom, camera)) {
+  for (const Numbered& mark : MarksSeenFrom(view, head, camera)) {
     svg += MarkSvg(mark);
   }
   return svg + "</g>\n";
@@ -139,15 +148,21 @@ Vec3 FarthestInMidline(const TriMesh& skull, const Far& far) {
   return best;
 }
 
-Vec3 PlaceOf(const Site& site, const TriMesh& skull, const MeshQuery& query,
+// Vertex and opisthocranion. The mean skull is cut below the one and before the other, so they are
+// marked where the brain case of a phantom over the same nasion has them.
+std::map<std::string, Vec3> VaultPlaces(const Vec3& nasion) {
+  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 40});
+  const auto place = [&](std::string_view code) {
+    return std::ranges::find(phantom.sites, code, &PhantomSite::site)->base;
+  };
+  const Vec3 g = place("g"), shift = nasion - place("n");
+  const Vec3 v = FarthestInMidline(phantom.skull, [](const Vec3& p) { return p.z(); });
+  const Vec3 op = FarthestInMidline(phantom.skull, [&](const Vec3& p) { return (p - g).norm(); });
+  return {{"v", v + shift}, {"op", op + shift}};
+}
+
+Vec3 PlaceOf(const Site& site, const MeshQuery& query,
              const std::map<std::string, Vec3>& standard) {
-  if (site.landmark == "v") {
-    return FarthestInMidline(skull, [](const Vec3& p) { return p.z(); });
-  }
-  if (site.landmark == "op") {
-    const Vec3 g = standard.at("g");
-    return FarthestInMidline(skull, [&](const Vec3& p) { return (p - g).norm(); });
-  }
   const auto* const between = std::ranges::find(kBetween, site.landmark, &Between::landmark);
   if (between == kBetween.end()) {
     throw InputError(fmt::format("sites: no picture has a place for {}; write one", site.code));
@@ -158,14 +173,15 @@ Vec3 PlaceOf(const Site& site, const TriMesh& skull, const MeshQuery& query,
   return query.Closest(a + between->share * (b - a) + added).position;
 }
 
-std::map<std::string, Vec3> PlacesOn(const Phantom& phantom, const MeshQuery& query) {
-  std::map<std::string, Vec3> places;
-  for (const PhantomSite& site : phantom.sites) {
-    places[site.site] = site.base;
-  }
-  const std::map<std::string, Vec3> standard = places;
+// The places of the standard sites and of the further ones.
+std::map<std::string, Vec3> AllPlaces(const ReferenceHead& head, const MeshQuery& query) {
+  const std::map<std::string, Vec3> standard = PlacesOf(head);
+  std::map<std::string, Vec3> places = standard;
+  places.merge(VaultPlaces(standard.at("n")));
   for (const Site& site : FurtherSites()) {
-    places[site.code] = PlaceOf(site, phantom.skull, query, standard);
+    if (!places.contains(site.code)) {
+      places[site.code] = PlaceOf(site, query, standard);
+    }
   }
   return places;
 }
@@ -221,31 +237,33 @@ const Site& KnownSite(std::string_view code) {
 
 std::string SitePictureSvg(int threads) {
   constexpr int kGap = 16;
-  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 120});
-  Box3 region = Bounds(phantom.skull);
+  const ReferenceHead head = ReadMeanSkull().head;
+  Box3 region = Bounds(head.shell.mesh);
   region.extend(Vec3(region.min() - Vec3(0, 15, 0)));  // room for the numbers before the face
   return fmt::format(
              "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
              "height=\"{1}\" font-family=\"system-ui, sans-serif\" font-size=\"14\" "
              "fill=\"#16304f\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
              2 * kSiteWidth + kGap, kSiteHeight + 34) +
-         ViewSvg(View::kFront, "front", 0, phantom, region, threads) +
-         ViewSvg(View::kSide, "left side", kSiteWidth + kGap, phantom, region, threads) +
-         "</svg>\n";
+         ViewSvg(View::kFront, "front", 0, head, region, threads) +
+         ViewSvg(View::kSide, "left side", kSiteWidth + kGap, head, region, threads) + "</svg>\n";
 }
 
 SiteSketch MakeSiteSketch(int threads) {
-  const Phantom phantom = MakePhantom({.random_seed = 1, .rings = 40});
-  const MeshQuery bone(phantom.skull);
-  const Box3 region = Bounds(phantom.skull);
+  const ReferenceHead head = ReadMeanSkull().head;
+  const MeshQuery bone(head.shell.mesh);
+  SiteSketch sketch{.places = AllPlaces(head, bone), .seen = {}};
+  Box3 region = Bounds(head.shell.mesh);
+  for (const auto& [site, place] : sketch.places) {
+    region.extend(place);
+  }
   constexpr double kAspect = static_cast<double>(kSketchWidth) / kSketchHeight;
   std::vector<Camera> cameras = CamerasFor(std::array{View::kFront, View::kSide}, region, kAspect);
   cameras.push_back(FromItsRight(cameras.back()));
   ShadowMaps shadows;
   std::vector<Image> images =
-      RenderAll({{SkullObject(phantom.skull)}}, cameras,
+      RenderAll({{SkullObject(head.shell.mesh)}}, cameras,
                 {.width = kSketchWidth, .height = kSketchHeight}, shadows, threads);
-  SiteSketch sketch{.places = PlacesOn(phantom, bone), .seen = {}};
   for (std::size_t k = 0; k < cameras.size(); ++k) {
     sketch.seen[k] = {cameras[k], std::move(images[k]), {}};
     for (const auto& [site, place] : sketch.places) {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pictures of the sites on the skull of a phantom.
+// Pictures of the sites on the mean skull of people (mean_skull.h).
 #pragma once
 
 #include <array>
@@ -16,8 +16,9 @@ namespace semblance::problems {
 // the standard sites as dots and their numbers as text.
 std::string SitePictureSvg(int threads);
 
-// A skull and its sites, kept to draw a picture for each site. A phantom has no further sites; they
-// are placed between other sites, as their definitions state.
+// A skull and its sites, kept to draw a picture for each site. The mean skull has no further sites;
+// they are placed between other sites, as their definitions state; vertex and opisthocranion where
+// a whole brain case would have them.
 struct SiteSketch {
   struct Seen {
     Camera camera;
