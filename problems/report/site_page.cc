@@ -113,9 +113,9 @@ by its code, its number with the side (`18l`), or a name (`left gonion`); upper 
 
 This page is made by `semblance landmarks page configs/tables/*.yaml --out docs/reference --force`; a test holds it and the program against each other.
 
-![the sites on a phantom's skull, by number]({})
+![the sites on the mean skull, by number]({})
 
-The skull is a phantom's, drawn by formula: it shows where the sites lie to each other, not what the bone looks like there.
+The skull is the mean of 54 people. It ends at the vault, and its teeth and the tip of the nasal bones are blurred.
 
 ## The 32 of the network
 

@@ -253,9 +253,11 @@ SiteSketch MakeSiteSketch(int threads) {
   const ReferenceHead head = ReadMeanSkull().head;
   const MeshQuery bone(head.shell.mesh);
   SiteSketch sketch{.places = AllPlaces(head, bone), .seen = {}};
+  const Vec3 room_mm = Vec3::Constant(8);  // for the discs of vertex and opisthocranion
   Box3 region = Bounds(head.shell.mesh);
   for (const auto& [site, place] : sketch.places) {
-    region.extend(place);
+    region.extend(Vec3(place - room_mm));
+    region.extend(Vec3(place + room_mm));
   }
   constexpr double kAspect = static_cast<double>(kSketchWidth) / kSketchHeight;
   std::vector<Camera> cameras = CamerasFor(std::array{View::kFront, View::kSide}, region, kAspect);
