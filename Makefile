@@ -81,7 +81,7 @@ heads: configure
 	@/usr/bin/python3 -B docs/heads.py build-quick/problems/semblance $(HEADS) out/heads $(if $(ONLY),--only "$(ONLY)",--page docs/experiments/heads.md)
 
 # The everyday tests: all but those with the labels documents (commands and figures of the documents), packaging, and thorough (pages in a
-# browser, a cluster, studies of accuracy). CI runs all.
+# browser, a cluster, whole heads and studies). CI runs all.
 test: build
 	@ctest --preset $(PRESET) -j "$$(nproc)"
 

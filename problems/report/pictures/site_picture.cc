@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "problems/report/pictures/lighting.h"
@@ -138,7 +139,7 @@ template <class Far>
 Vec3 FarthestInMidline(const TriMesh& skull, const Far& far) {
   constexpr double kNear_mm = 3;
   Vec3 best = Vec3::Zero();
-  double most = -INFINITY;
+  double most = -std::numeric_limits<double>::infinity();
   for (const Vec3& p : skull.points) {
     if (std::abs(p.x()) < kNear_mm && far(p) > most) {
       best = p;
