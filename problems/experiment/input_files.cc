@@ -280,7 +280,7 @@ CheckFindings InputCheck::CheckCase(const Experiment& experiment) {
       return LoadSubject(experiment.subject, context_);
     });
     const auto bone = own_.Get<MeshQuery>(StageKey("bone", experiment.subject),
-                                             [&] { return MeshQuery(subject->skull); });
+                                          [&] { return MeshQuery(subject->skull); });
     const Case made = MakeCase(*subject, experiment, *bone, {});
     CheckFaceOptions(experiment, made);
     for (const TextLines& notes :
