@@ -51,7 +51,7 @@ bool OnOneCircle(const std::array<Vec2, 4>& p) {
   return std::abs((center - p[3]).norm() - radius) < kSame * radius;
 }
 
-// How much nearer to u = 1/2 the upper end of a link is than its lower end.
+// Returns by how much the upper end of a link is nearer to u = 1/2 than its lower end.
 double RiseToMiddle(const Vec2& a, const Vec2& b) {
   const Vec2 &low = a.y() < b.y() ? a : b, &high = a.y() < b.y() ? b : a;
   return std::abs(low.x() - 0.5) - std::abs(high.x() - 0.5);

@@ -63,7 +63,7 @@ std::string DescribeFrame(const Mat3& file_from_lps);
 // and R is 80 mm.
 double SagittaOfTriangles_mm(const TriMesh& mesh);
 
-// How skin covers bone along rays from all sides to the middle of the head. From below no ray
+// The cover of bone by skin along rays from all sides to the middle of the head. From below no ray
 // counts, because skins end at the neck.
 struct SkinCover {
   double met_share = 0;      // of the rays that meet bone, those that meet outer skin, too

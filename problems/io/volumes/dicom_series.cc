@@ -469,7 +469,7 @@ void RequireOnePerson(const DicomSeries& series, const std::string& where) {
   }
 }
 
-// All slices have the number, or none has it; in a CT, its slopes are equal.
+// All slices have the number, or none does; in a CT, its slopes are equal.
 void CheckRescale(const DicomSeries& series, double DicomHeader::*member, const std::string& tag,
                   const std::string& where, std::vector<std::string>& notes) {
   ImagesByValue present, values;

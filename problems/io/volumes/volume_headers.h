@@ -37,7 +37,7 @@ HeaderPlace ParseNrrdPlace(std::string_view head, const std::string& where);
 
 // ITK provides the steps of a MetaImage in LPS, but ignores their unit, the slope of the values and
 // AnatomicalOrientation, and reads each number up to its first odd character ("8,9" as 8). Throws
-// InputError, naming `where` and the field, for a field that is not as MetaImage has it. Format:
+// InputError, naming `where` and the field, for a field that MetaImage does not allow. Format:
 // https://itk.org/Wiki/ITK/MetaIO/Documentation.
 HeaderPlace ParseMetaImagePlace(std::string_view head, const std::string& where);
 
