@@ -105,7 +105,7 @@ bool HasTwoAlike(const Triangle& t) { return t[0] == t[1] || t[1] == t[2] || t[2
 // True if the order of the corners is that of the sorted corners, cyclically.
 bool IsEven(const Triangle& t) { return (t[0] < t[1]) + (t[1] < t[2]) + (t[2] < t[0]) == 2; }
 
-// Keeps what is left of triangles that lie on each other.
+// The triangles that remain where several lie on each other.
 struct Distinct {
   std::vector<Triangle> triangles;
   std::vector<bool> both_ways;  // per triangle: another one has the opposite orientation
