@@ -5,7 +5,7 @@ import pathlib
 import struct
 import sys
 
-sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "attack"))
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
 import seeds
 
 
