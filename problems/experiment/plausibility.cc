@@ -20,7 +20,6 @@
 #include "problems/subject/sites.h"
 #include "problems/subject/tissue_table.h"
 #include "surfaces/base/json_text.h"
-#include "surfaces/base/parallel.h"
 #include "surfaces/base/quantile.h"
 #include "surfaces/mesh/mesh_query.h"
 
