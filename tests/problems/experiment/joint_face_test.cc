@@ -132,11 +132,14 @@ TEST(JointFace, WithoutSeedsTheDowelsAndTheModelMakeTheFace) {
 TEST(JointFace, BoneStaysInsideAFaceWithHardlyAnyTissue) {
   const RunResult result = RunSmall("joint", {"tissue.set_mm={zy_l: 0.5, zy_r: 0.5, lo_l: 0.5, "
                                               "lo_r: 0.5, mio_l: 0.5, mio_r: 0.5}"});
+  int judged = 0;
   for (const PlausibilityCheck& check : result.plausibility.checks) {
     if (check.name == "bone_share" || check.name == "bone_most_mm") {
       EXPECT_LT(check.value, 0.002) << check.sentence;
+      ++judged;
     }
   }
+  EXPECT_EQ(judged, 2);
 }
 
 TEST(JointFace, TheNumberOfThreadsChangesNoByteThorough) {

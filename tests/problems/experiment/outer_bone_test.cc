@@ -63,13 +63,16 @@ TEST(OuterBone, BoneThatWasNotObservedHasNoSample) {
       origin[t] = BoneOrigin::kMirrored;
     }
   }
-  for (const BoneSample& sample : SampleOf(skull, 4, origin)) {
+  const std::vector<BoneSample> samples = SampleOf(skull, 4, origin);
+  EXPECT_NEAR(4 * static_cast<double>(samples.size()), 2 * std::numbers::pi * 2500, 150);
+  for (const BoneSample& sample : samples) {
     EXPECT_GE(sample.position.x(), 0);
   }
 }
 
 TEST(OuterBone, OutsideIsTheDistanceFromTheFace) {
   std::vector<BoneSample> samples = SampleOf(HollowSphere(50, 46), 40);
+  ASSERT_GT(samples.size(), 500u);
   const Vec3 center(4, 0, 0);
   MeasureOutside(BallFace(center, 52), samples, {});
   for (const BoneSample& sample : samples) {
@@ -86,6 +89,7 @@ TEST(OuterBone, BoneBeyondTheBorderOfTheFaceIsNotMeasured) {
                 [&](const Triangle& t) { return TriangleCentroid(half.mesh, t).x() < 0; });
   std::vector<BoneSample> samples = SampleOf(HollowSphere(50, 46), 40);
   MeasureOutside(half, samples, {});
+  ASSERT_GT(samples.size(), 500u);
   for (const BoneSample& sample : samples) {
     if (std::abs(sample.position.x()) > 5) {
       EXPECT_EQ(std::isnan(sample.outside_mm), sample.position.x() < 0) << sample.position;
