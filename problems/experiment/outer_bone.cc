@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 
 #include "surfaces/base/parallel.h"
 
@@ -62,12 +63,12 @@ std::vector<BoneSample> SampleOuterBone(const TriMesh& skull, std::span<const Bo
                                         double area_mm2, const RunContext& context) {
   constexpr double kShell_mm = 3, kLeastCosine = 0.3;
   const std::vector<BoneSample> samples = SampleBone(skull, origin, area_mm2);
-  std::vector<char> is_outer(samples.size());
+  std::vector<std::uint8_t> is_outer(samples.size());  // bytes: threads may write neighbours
   ParallelFor(samples.size(), context.threads, 256, [&](std::size_t n) {
     const MeshPoint at = query.Closest(samples[n].position);
     const Vec3 out = TriangleAreaVector(shell, shell.triangles[at.triangle]);
-    is_outer[n] =
-        at.distance_mm <= kShell_mm && out.dot(samples[n].normal) > kLeastCosine * out.norm();
+    const bool faces_alike = out.dot(samples[n].normal) > kLeastCosine * out.norm();
+    is_outer[n] = at.distance_mm <= kShell_mm && faces_alike ? 1 : 0;
   });
   std::vector<BoneSample> outer;
   for (std::size_t n = 0; n < samples.size(); ++n) {
