@@ -391,7 +391,42 @@ NearestSamples FromEverywhere(std::size_t count, std::size_t own) {
   return indices;
 }
 
-constexpr std::size_t kMostSamples = 8000;  // bounds the time of the following two
+// The square of the shortest range that holds eleven of the seventeen x. Outliers that are fewer
+// than a third of them do not count.
+double ShortestSpread(const std::vector<MapSample>& samples, const NearestSamples& indices) {
+  constexpr int kMost = 11;
+  std::array<double, kNearWithItself> x;
+  std::ranges::transform(indices, x.begin(),
+                         [&](std::uint32_t n) { return samples[n].position.x(); });
+  std::ranges::sort(x);
+  double shortest = x.back() - x.front();
+  for (int n = 0; n + kMost <= kNearWithItself; ++n) {
+    shortest = std::min(shortest, x[n + kMost - 1] - x[n]);
+  }
+  return shortest * shortest;
+}
+
+// The median of a measure of neighbours over the median of a measure of samples from everywhere.
+template <class Near, class Anywhere>
+double RatioToAnywhere(const std::vector<MapSample>& samples, double period_mm,
+                       const Near& near_measure, const Anywhere& anywhere_measure) {
+  constexpr std::size_t kProbes = 300;
+  if (samples.size() <= kNearWithItself) {
+    return 0;
+  }
+  const auto count = static_cast<std::uint32_t>(samples.size());
+  std::vector<double> near, anywhere;
+  for (std::uint32_t own = 0; own < count; own += std::max<std::size_t>(count / kProbes, 1)) {
+    near.push_back(near_measure(NearestBy(count, own, [&](std::uint32_t n) {
+      return Way(samples[own].at, samples[n].at, period_mm).squaredNorm();
+    })));
+    anywhere.push_back(anywhere_measure(FromEverywhere(count, own)));
+  }
+  const double all = UpperMedian(anywhere);
+  return all > 0 ? UpperMedian(near) / all : 0;
+}
+
+constexpr std::size_t kMostSamples = 8000;  // bounds the time of the following
 
 }  // namespace
 
@@ -401,22 +436,19 @@ double MixedShare(const PlaneMap& map) {
 }
 
 double NeighbourScatter(const PlaneMap& map) {
-  constexpr std::size_t kProbes = 300;
   const std::vector<MapSample> samples = FewerSamples(map, kMostSamples);
-  if (samples.size() <= kNearWithItself) {
-    return 0;
-  }
-  const auto count = static_cast<std::uint32_t>(samples.size());
-  std::vector<double> near, anywhere;
-  for (std::uint32_t own = 0; own < count; own += std::max<std::size_t>(count / kProbes, 1)) {
-    const NearestSamples nearest = NearestBy(count, own, [&](std::uint32_t n) {
-      return Way(samples[own].at, samples[n].at, map.period_mm).squaredNorm();
-    });
-    near.push_back(SquaresAroundPlane(samples, nearest, map.period_mm));
-    anywhere.push_back(SquaresAroundMean(samples, FromEverywhere(count, own)));
-  }
-  const double all = UpperMedian(anywhere);
-  return all > 0 ? UpperMedian(near) / all : 0;
+  return RatioToAnywhere(
+      samples, map.period_mm,
+      [&](const NearestSamples& near) { return SquaresAroundPlane(samples, near, map.period_mm); },
+      [&](const NearestSamples& anywhere) { return SquaresAroundMean(samples, anywhere); });
+}
+
+double ScatterOfMostHeights(const PlaneMap& map) {
+  const std::vector<MapSample> samples = FewerSamples(map, kMostSamples);
+  const auto spread = [&](const NearestSamples& indices) {
+    return ShortestSpread(samples, indices);
+  };
+  return RatioToAnywhere(samples, map.period_mm, spread, spread);
 }
 
 }  // namespace semblance::fitting

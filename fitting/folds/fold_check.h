@@ -52,4 +52,10 @@ double MixedShare(const PlaneMap& map);
 // positions, and small for a surface. Returns 0 for fewer than 18 points or points at one place.
 double NeighbourScatter(const PlaneMap& map);
 
+// The same for heights that may have many outliers, as a measure along x alone: the squared length
+// of the shortest range that holds eleven of 17 heights, of neighbours over that of points from
+// everywhere. Up to a third of outliers has no effect, on one side or on both; half of the heights
+// on each of two sheets give about 1.
+double ScatterOfMostHeights(const PlaneMap& map);
+
 }  // namespace semblance::fitting

@@ -57,6 +57,7 @@
 #include "fitting/nested/neighbour_noise.h"
 #include "fitting/nested/nested_surface.h"
 #include "fitting/nested/outlier_search.h"
+#include "fitting/nested/run_offsets.h"
 #include "fitting/nested/shared_errors.h"
 #include "fitting/nested/unresolved_detail.h"
 #include "fitting/nested/weight_search.h"
@@ -183,12 +184,14 @@ struct Snapshot {
 
 class NestedFitter {
  public:
-  NestedFitter(const HSplineSurface& start, NestedPoints points, const AutoPlan& plan,
-               const RunContext& context)
+  // offsets: those that were subtracted from the points.
+  NestedFitter(const HSplineSurface& start, NestedPoints points, std::optional<RunOffsets> offsets,
+               const AutoPlan& plan, const RunContext& context)
       : start_(start),
         plan_(plan),
         context_(context),
         points_(std::move(points)),
+        offsets_(std::move(offsets)),
         solve_(points_, MeanLengths(start)),
         rounding_mm_(kRoundingOfPoints * MeanLengths(start).norm()),
         space_(start.shape()),
@@ -671,7 +674,7 @@ class NestedFitter {
     DesignEffect effect(runs);
     std::optional<Residual> last;
     NestedResiduals(solve_).ForEach([&](std::size_t k, const Residual& residual) {
-      const double square = residual.Square();
+      const double square = AsGiven(k, residual).Square();
       result.residual_mm[points_.given[k]] = std::sqrt(square);
       sum += points_.Weight(k) * square;
       weights += points_.Weight(k);
@@ -684,10 +687,10 @@ class NestedFitter {
         effect.Add(k, scaled);
       }
     });
-    report_.effective_share =
-        report_.met_to_rounding ? 1
-        : shared_ ? std::min(1.0, std::pow(report_.noise_mm, 2) / shared_->square_per_parameter)
-                  : 1 / effect.Value();
+    report_.effective_share = EffectiveShare(effect);
+    if (offsets_) {
+      AddOffsetsToReport();
+    }
     MeasureCopies(result);
     for (const RepeatedPoint& copy : points_.repeated) {
       sum += copy.weight * result.residual_mm[copy.given] * result.residual_mm[copy.given];
@@ -695,6 +698,37 @@ class NestedFitter {
     }
     result.rms_mm = std::sqrt(sum / weights);
     report_.neighbour_correlation = neighbours.Value();
+  }
+
+  // The residual of a given point, of which its run's offset is a part.
+  Residual AsGiven(std::size_t k, Residual residual) const {
+    if (offsets_) {
+      residual.along[0] += offsets_->At(k);
+    }
+    return residual;
+  }
+
+  double EffectiveShare(const DesignEffect& effect) const {
+    if (report_.met_to_rounding) {
+      return 1;
+    }
+    return shared_ ? std::min(1.0, std::pow(report_.noise_mm, 2) / shared_->square_per_parameter)
+                   : 1 / effect.Value();
+  }
+
+  // Offsets are a part of a point's noise. Points count as so many independent ones that the
+  // surface's variance becomes that by the noise beside the offsets and what it follows of them.
+  void AddOffsetsToReport() {
+    const double beside = std::pow(report_.noise_mm, 2),
+                 all = beside + std::pow(offsets_->sd_mm, 2),
+                 parameters_per_point =
+                     report_.degrees_of_freedom / static_cast<double>(points_.size()),
+                 variance = beside * parameters_per_point / report_.effective_share +
+                            offsets_->left_square;
+    report_.noise_mm = std::sqrt(all);
+    report_.effective_share = std::min(1.0, all * parameters_per_point / variance);
+    report_.run_offset_mm = offsets_->sd_mm;
+    report_.runs = static_cast<int>(offsets_->runs.count);
   }
 
   // Computes the distances of copies; those of exact copies are their original's.
@@ -766,7 +800,8 @@ class NestedFitter {
   // rounding, or those of neighbours.
   NestedWeight SmoothOverSharedErrors(NestedWeightSearch& search, std::size_t count) {
     const NestedWeight found = SmoothWithinRounding(search, count);
-    if (is_rounded_below_ || std::isnan(found.weight) || !MayFollowErrors()) {
+    const bool is_first = !std::exchange(has_sought_shared_, true);
+    if (!is_first || is_rounded_below_ || std::isnan(found.weight) || !MayFollowErrors()) {
       return found;
     }
     const NestedSolve::Packed solution = solve_.Solution();
@@ -811,6 +846,7 @@ class NestedFitter {
   // Fills the report, except for the statistics of distances (Measure).
   void Report(const NestedWeight& chosen) {
     report_.weight = weight_;
+    report_.degrees_of_freedom = chosen.degrees_of_freedom;
     report_.stretch = FindStretch(metric_).stretch;
     report_.direction_deg = FindStretch(metric_).direction_deg;
     report_.weighted = points_.weighted;
@@ -855,7 +891,8 @@ class NestedFitter {
   const HSplineSurface& start_;
   const AutoPlan& plan_;
   const RunContext& context_;
-  NestedPoints points_;  // only mean_weight changes (invariant 3)
+  NestedPoints points_;                // only mean_weight changes (invariant 3)
+  std::optional<RunOffsets> offsets_;  // of the given points, which were subtracted from points_
   NestedSolve solve_;
   double rounding_mm_;  // held-out error that is round-off
   NestedSpace space_;
@@ -877,6 +914,7 @@ class NestedFitter {
   // Errors that points share.
   double least_noise_square_;           // RoundingNoiseSquare
   std::optional<SharedErrors> shared_;  // of the final fit
+  bool has_sought_shared_ = false;      // once, because the search is slow
   bool is_rounded_below_ = false;       // of the last search
   // The progress.
   bool densified_ = false;        // Densify has overlaid a whole level
@@ -952,7 +990,11 @@ NestedFitResult FitNested(const HSplineSurface& start, NestedPoints points, cons
   if (points.size() < kMinPoints) {
     FailForFew(points.size(), points.repeated.empty() ? "" : " that differ");
   }
-  return NestedFitter(start, std::move(points), plan, context).Run();
+  std::optional<RunOffsets> offsets = FindRunOffsets(points, start);
+  if (offsets) {
+    Level(*offsets, points);
+  }
+  return NestedFitter(start, std::move(points), std::move(offsets), plan, context).Run();
 }
 
 NestedFitResult FitNested(const HSplineSurface& start, const ScatteredPoints& points,

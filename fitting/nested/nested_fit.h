@@ -46,6 +46,7 @@ struct AutoReport {
   int chosen_round = -1;
   double weight = kNaN;                 // of the final fit to all points, as in NestedRound
   double length_mm = 1;                 // SmoothnessTerm::length_mm of the weights
+  double degrees_of_freedom = kNaN;     // of the final fit
   double stretch = 1;                   // of the final fit
   double direction_deg = 0;             // of the final fit
   double noise_mm = kNaN;               // standard deviation of a point along one axis, by the fit
@@ -55,6 +56,8 @@ struct AutoReport {
   double held_out_rms_mm = kNaN;        // along one axis, of the tenth that was held out
   double neighbour_correlation = kNaN;  // of residuals of consecutive points on the curve
   double effective_share = 1;           // independent points per point, by correlated residuals
+  int runs = 0;                         // runs of the file with offsets of their own
+  double run_offset_mm = kNaN;          // standard deviation of these offsets, a part of noise_mm
   double lattice_mm = 0;                // step of heights that were rounded to it; 0: they were not
   bool outliers_together = false;       // outliers stand together, as on a narrow ridge
   bool has_long_tail = false;           // of the residuals; set by a caller that judges them

@@ -33,7 +33,7 @@ double MeanSquareBeyondRounding(NestedSolve& solve, const NestedPoints& points,
 }
 
 double MostSharedSquare(const NestedPoints& points, const std::vector<char>& outlier) {
-  constexpr double kMostShare = 0.0025;  // a twentieth of the heights
+  constexpr double kMostShare = 0.0225;  // a seventh of the heights
   Vec3 sum = Vec3::Zero(), squares = Vec3::Zero();
   double count = 0;
   for (std::size_t k = 0; k < points.size(); ++k) {

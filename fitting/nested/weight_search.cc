@@ -2,6 +2,7 @@
 #include "fitting/nested/weight_search.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 #include <utility>
@@ -229,13 +230,34 @@ double NestedWeightSearch::SquarePerParameter(const NestedWeight& rougher,
          (kFreed * (rougher.degrees_of_freedom - smoother.degrees_of_freedom));
 }
 
+namespace {
+
+// The step at whose end residuals have let go of shared errors: the last flat step before a steep
+// one; -1 if there is none. rises: log2 of the growth of the residuals' squares, per step.
+std::ptrdiff_t KneeOf(const std::vector<double>& rises) {
+  struct Bend {
+    double steep, flat;
+  };
+  // A plain knee, and one between a flatter and a less steep part, as of many points.
+  constexpr std::array<Bend, 2> kBends = {Bend{1.7, 1.3}, Bend{1.4, 0.7}};
+  std::ptrdiff_t knee = -1;
+  for (const Bend& bend : kBends) {
+    const auto up =
+        std::find_if(rises.rbegin(), rises.rend(), [&](double rise) { return rise > bend.steep; });
+    const auto flat = std::find_if(up, rises.rend(), [&](double rise) { return rise < bend.flat; });
+    knee = std::max(knee, rises.rend() - flat - 1);
+  }
+  return knee;
+}
+
+}  // namespace
+
 // The constants were chosen on Franke's function, hills, waves and bumps with errors correlated
 // over 0, 0.01, 0.02 and 0.04 of the domain (exponential and Gaussian), with 3e3 to 3e4 points. The
 // knee found there was the weight of least error. On rough terrain (H = 0.5 and 0.8), creases,
 // steps and lattices of bumps none was found.
 std::optional<SharedErrors> NestedWeightSearch::FindSharedErrors(double from, double most) {
   constexpr double kFactor = 4;
-  constexpr double kRise = 1.7, kFlat = 1.3;  // log2 of the growth of squares, beyond and before
   // Steps to the knee; fewer are within the choice of cross-validation itself.
   constexpr std::ptrdiff_t kFewest = 3, kMost = 16;
   std::vector<NestedWeight> tried = {Try(from)};
@@ -245,9 +267,7 @@ std::optional<SharedErrors> NestedWeightSearch::FindSharedErrors(double from, do
     tried.push_back(Try(tried.back().weight * kFactor));
     rises.push_back(std::log2(tried.back().mean_square / before));
   }
-  const auto up = std::find_if(rises.rbegin(), rises.rend(), [](double r) { return r > kRise; });
-  const auto flat = std::find_if(up, rises.rend(), [](double r) { return r < kFlat; });
-  const std::ptrdiff_t knee = rises.rend() - flat - 1;
+  const std::ptrdiff_t knee = KneeOf(rises);
   if (knee < kFewest) {
     return std::nullopt;
   }

@@ -304,13 +304,34 @@ Parametrisation Take(CheckedMap checked, ParameterSource source) {
       planes.looked_at));
 }
 
-// Returns how much of the heights over a plane neighbours do not share (NeighbourScatter).
-double HeightScatter(const Scan& scan, const PointMap& map) {
+// The heights over a plane, as vectors along x.
+std::vector<Vec3> HeightsAlongX(const Scan& scan, const PointMap& map) {
   std::vector<Vec3> heights;
   for (const Vec3& p : scan.positions) {
     heights.emplace_back((p - scan.positions[0]).dot(map.normal), 0, 0);
   }
-  return NeighbourScatter({heights, map.at});
+  return heights;
+}
+
+// Returns how much of the heights over a plane neighbours do not share (NeighbourScatter).
+double HeightScatter(const Scan& scan, const PointMap& map) {
+  return NeighbourScatter({HeightsAlongX(scan, map), map.at});
+}
+
+// Returns whether neighbours share the heights over a plane, or most neighbours do.
+bool ShareHeights(const Scan& scan, const PointMap& map) {
+  // Trades noise as large as the relief (0.5), which passes, for shells and solids (0.8 to 1),
+  // which do not.
+  constexpr double kMostScatter = 0.7;
+  // Trades 30 % of gross errors (0.01), which pass, for solids and two sheets (about 1).
+  constexpr double kMostScatterOfMost = 0.1;
+  constexpr std::size_t kFewest = 68;  // four neighbourhoods; of fewer each has most of the points
+  if (scan.positions.size() < kFewest) {
+    return true;
+  }
+  const std::vector<Vec3> heights = HeightsAlongX(scan, map);
+  return NeighbourScatter({heights, map.at}) <= kMostScatter ||
+         ScatterOfMostHeights({heights, map.at}) <= kMostScatterOfMost;
 }
 
 // Returns whether the points have no height over the plane: the heights spread like the places, and
@@ -370,9 +391,6 @@ bool SpreadOverXy(std::span<const Vec3> positions) {
 // heights, and next to none of them fold. Heights count by their shape alone. Names of columns that
 // mean a map need less evidence.
 std::optional<CheckedMap> HeightsOverXy(const Scan& scan, const MapChoice& planes) {
-  // Trades noise as large as the relief (0.5), which passes, for shells and solids (0.8 to 1),
-  // which do not.
-  constexpr double kMostScatter = 0.7;
   // Spread of the heights relative to the places. Higher values find closer sheets, and more folds
   // in rough terrain where there are none.
   constexpr double kHeightShare = 0.35;
@@ -386,9 +404,9 @@ std::optional<CheckedMap> HeightsOverXy(const Scan& scan, const MapChoice& plane
   const double factor =
       spreads.height_mm > 0 ? kHeightShare * spreads.place_mm / spreads.height_mm : 1;
   map.faults = FindFaults(scan, map.map, factor);
-  const bool is_found = scan.has_map_columns ? map.faults.Sum() <= kMostFaultsOfMap
-                                             : map.faults.Sum() <= kMostFaults &&
-                                                   HeightScatter(scan, map.map) <= kMostScatter;
+  const bool is_found = scan.has_map_columns
+                            ? map.faults.Sum() <= kMostFaultsOfMap
+                            : map.faults.Sum() <= kMostFaults && ShareHeights(scan, map.map);
   return is_found ? std::optional(std::move(map)) : std::nullopt;
 }
 

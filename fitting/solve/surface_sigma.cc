@@ -129,7 +129,7 @@ struct SurfaceSigma::Model {
         cloud(surface.shape(), points),
         space(empty, empty, cloud),
         elements(space) {
-    const auto count = static_cast<double>(points.size());
+    count = static_cast<double>(points.size());
     points = std::vector<Observation>();  // frees it, which {} would not
     space.Measure({}, /*threads=*/1, nullptr);
     const double scale = 1 / cloud.weight_sum();
@@ -167,7 +167,7 @@ struct SurfaceSigma::Model {
   HierarchicalSplineSpace space;
   SplineElements elements;
   std::vector<Matrix16> covariances;  // of each element's vertices, for noise 1
-  double variance = kNaN, determined = kNaN;
+  double count = kNaN, variance = kNaN, determined = kNaN;
 };
 
 SurfaceSigma::SurfaceSigma(const HSplineSurface& surface, const AttributeColumns& points,
@@ -200,5 +200,15 @@ std::vector<double> SurfaceSigma::At(std::span<const Vec2> uv) const {
 }
 
 double SurfaceSigma::degrees_of_freedom() const { return model_->determined; }
+
+std::vector<double> SurfaceSigma::OfChosen(std::span<const Vec2> uv) const {
+  constexpr double kLeastLeft = 0.02;  // of the points; a factor beyond 7 would say nothing
+  const double factor = 1 / std::sqrt(std::max(1 - model_->determined / model_->count, kLeastLeft));
+  std::vector<double> sigma = At(uv);
+  for (double& at : sigma) {
+    at *= factor;
+  }
+  return sigma;
+}
 
 }  // namespace semblance::fitting

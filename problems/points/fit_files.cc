@@ -110,7 +110,7 @@ MeshAttributes AttributesAt(const PointFit& result, std::span<const Vec2> uv, in
     }
   }
   if (result.sigma) {
-    attributes.scalars.push_back({"sigma_mm", result.sigma->At(uv)});
+    attributes.scalars.push_back({"sigma_mm", result.sigma->OfChosen(uv)});
   }
   for (std::size_t k = 0; coloured && k < uv.size(); ++k) {
     attributes.colors.push_back(

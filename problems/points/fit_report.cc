@@ -111,6 +111,8 @@ nlohmann::ordered_json AutoJson(const AutoReport& r) {
                {"neighbour_correlation", r.neighbour_correlation},
                {"effective_share", r.effective_share},
                {"lattice_mm", r.lattice_mm},
+               {"runs_with_offsets", r.runs},
+               {"run_offset_mm", r.run_offset_mm},
                {"outliers_together", r.outliers_together},
                {"met_to_rounding", r.met_to_rounding},
                {"limited_by_density", r.limited_by_density},
@@ -148,6 +150,12 @@ std::string AutoText(const AutoReport& r, std::string_view unit) {
     text +=
         fmt::format("heights are whole multiples of {}: the surface does not follow the rounding\n",
                     LengthText(r.lattice_mm, unit, 3));
+  }
+  if (r.runs > 0) {
+    text += fmt::format(
+        "{} runs of the file, as lines of a scan, lie {} (standard deviation) off each other: the "
+        "surface is fitted to them as if they did not\n",
+        r.runs, LengthText(r.run_offset_mm, unit, 3));
   }
   if (SharesErrors(r)) {
     text +=

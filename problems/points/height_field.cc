@@ -77,7 +77,8 @@ void ScaleHeights(double factor, FitResult& fit) {
   AutoReport& report = *fit.automatic;
   for (double* const length :
        {&report.noise_mm, &report.neighbour_noise_mm, &report.closer_noise_mm,
-        &report.held_out_rms_mm, &report.by_weight.light_mm, &report.by_weight.heavy_mm}) {
+        &report.held_out_rms_mm, &report.by_weight.light_mm, &report.by_weight.heavy_mm,
+        &report.run_offset_mm, &report.lattice_mm}) {
     *length *= factor;
   }
   for (NestedRound& round : report.rounds) {

@@ -116,7 +116,7 @@ void AddSigma(const GivenPoints& given, const HSplineSurface& start, StepClock& 
               PointFit& result) {
   if (result.Faults().empty()) {
     result.sigma = step("sigma", [&] { return SigmaOver(result, given, start); });
-    result.sigma_mm = result.sigma->At(result.fit.uv);
+    result.sigma_mm = result.sigma->OfChosen(result.fit.uv);
   }
 }
 

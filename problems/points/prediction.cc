@@ -162,7 +162,7 @@ double HeightPredictor::FindLimit() const {
        k += std::max<std::size_t>(evidence_->uv.size() / kSample, 1)) {
     some.push_back(evidence_->uv[k]);
   }
-  std::vector<double> sd = sigma_->At(some);
+  std::vector<double> sd = sigma_->OfChosen(some);
   return std::max(evidence_->noise_mm, kOfPoints * Quantile(sd, kShare));
 }
 
@@ -203,7 +203,7 @@ PredictedHeights HeightPredictor::At(std::span<const Vec2> xy, double level, int
     }
   }
   const std::vector<Vec3> points = HSplineBatch(surface_).Points(uv, threads);
-  const std::vector<double> sd = evidence_ ? sigma_->At(uv) : std::vector<double>();
+  const std::vector<double> sd = evidence_ ? sigma_->OfChosen(uv) : std::vector<double>();
   const auto noise_at = [&](const Vec2& at) { return noise_.At(at); };
   const double factor = evidence_ ? IntervalFactor(*evidence_, noise_at, level) : kNaN;
   for (std::size_t n = 0; n < uv.size(); ++n) {

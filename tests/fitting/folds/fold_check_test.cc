@@ -203,6 +203,34 @@ TEST(FoldCheck, ARollDiffersFromNoiseAsWideAsItsSpacing) {
   }
 }
 
+// Of heights with outliers on one side or both, most neighbours agree; those of two sheets and of
+// solids do not.
+TEST(FoldCheck, MostHeightsAgreeBetweenOutliersAlone) {
+  const auto scatter = [](const std::function<double(const Vec2&, Random&)>& height) {
+    Random random(12);
+    Cloud cloud;
+    for (int k = 0; k < 5000; ++k) {
+      const Vec2 at(random.Uniform(), random.Uniform());
+      cloud.positions.emplace_back(height(at, random), 0, 0);
+      cloud.at.push_back(at);
+    }
+    return ScatterOfMostHeights({cloud.positions, cloud.at});
+  };
+  const auto franke = [](const Vec2& at) { return testing::FrankePoint(at).z(); };
+  const auto with_outliers = [&](double low) {
+    return [&franke, low](const Vec2& at, Random& random) {
+      return franke(at) + (random.Uniform() < 0.3 ? random.Uniform(low, 1) : 0);
+    };
+  };
+  EXPECT_LT(scatter(with_outliers(0.1)), 0.05);
+  EXPECT_LT(scatter(with_outliers(-1)), 0.05);
+  EXPECT_GT(scatter([&](const Vec2& at, Random& random) {
+              return franke(at) + (random.Uniform() < 0.5 ? 1 : 0);
+            }),
+            0.5);
+  EXPECT_GT(scatter([](const Vec2&, Random& random) { return random.Uniform(); }), 0.8);
+}
+
 TEST(FoldCheck, AFewPointsShowNoFaults) { EXPECT_EQ(FromAbove(OnSphere, 20).Faults().Sum(), 0); }
 
 }  // namespace

@@ -151,7 +151,9 @@ TEST(ErrorStructure, RunsAreThoseOfTheFile) {
 
 // Lines without drift are as good as independent points.
 TEST(ErrorStructure, LinesThatDoNotDriftCountInFull) {
-  EXPECT_GT(ScanLines(0).Fit().report.effective_share, 0.7);
+  const AutoReport report = ScanLines(0).Fit().report;
+  EXPECT_GT(report.effective_share, 0.7);
+  EXPECT_EQ(report.runs, 0);
 }
 
 // The design effect of blocks that share a part of their error, by its definition.
@@ -238,22 +240,57 @@ double CoverageOf(const NestedFitResult& fit, const Points& points) {
   return within / static_cast<double>(places.size());
 }
 
+// A surface that follows the lines is as far off as they are; the mean of all 80 is a ninth of it.
+TEST(ErrorStructure, OffsetsOfLinesAreNotFollowed) {
+  constexpr double kDrift = 0.05;
+  const Points lines = ScanLines(kDrift);
+  const NestedFitResult fit = lines.Fit();
+  EXPECT_EQ(fit.report.runs, 80);
+  EXPECT_NEAR(fit.report.run_offset_mm, kDrift, 0.3 * kDrift);
+  EXPECT_NEAR(fit.report.noise_mm, kDrift, 0.3 * kDrift);  // of which the offsets are nearly all
+  EXPECT_LT(ErrorOf(fit.surface), 0.6 * kDrift);
+  EXPECT_GT(CoverageOf(fit, lines), 0.7);
+  double sum = 0;
+  for (std::size_t k = 0; k < lines.uv.size(); ++k) {
+    const double off = fit.surface.Point(lines.uv[k]).z() - lines.positions[k].z();
+    EXPECT_NEAR(fit.residual_mm[k], std::abs(off), 1e-9);  // of the points as given
+    sum += off * off;
+  }
+  EXPECT_NEAR(fit.rms_mm, std::sqrt(sum / static_cast<double>(lines.uv.size())), 1e-9);
+}
+
+// Rough ground along lines differs from line to line, but not along the whole of them.
+TEST(ErrorStructure, RoughGroundAlongLinesIsNoOffset) {
+  const testing::Fractal ground;
+  Points lines;
+  for (int k = 0; k < 8000; ++k) {
+    const Vec2 at((k % 100 + 0.5) / 100, (k / 100 + 0.5) / 80);
+    lines.Add(at, ground(at));
+  }
+  ASSERT_EQ(FindFileRuns(lines.Nested()).count, 80u);
+  EXPECT_EQ(lines.Fit().report.runs, 0);
+}
+
 TEST(ErrorStructure, ErrorsOfNeighboursAreNotFollowed) {
-  constexpr double kNoise = 5e-3;
   constexpr int kPoints = 10000;
+  struct Case {
+    bool is_rough;
+    double noise;  // 0.06 is a thirteenth of the heights' standard deviation
+  };
+  const std::vector<Case> cases = {{false, 5e-3}, {true, 5e-3}, {false, 0.06}};
   double coverage = 0;
-  for (const bool is_rough : {false, true}) {
+  for (const auto& [is_rough, noise] : cases) {
     const CorrelatedErrors errors(0.02, is_rough, 9);
     Random random(10);
     Points points;
     for (int k = 0; k < kPoints; ++k) {
       const Vec2 at(random.Uniform(0, 1), random.Uniform(0, 1));
-      points.Add(at, Hills(at) + kNoise * errors(at));
+      points.Add(at, Hills(at) + noise * errors(at));
     }
     const NestedFitResult fit = points.Fit();
-    EXPECT_LT(ErrorOf(fit.surface), 0.75 * kNoise);  // 0.85 to 1 if the errors are followed
+    EXPECT_LT(ErrorOf(fit.surface), 0.75 * noise);  // 0.85 to 1 if the errors are followed
     EXPECT_LT(fit.report.effective_share, 0.3);
-    coverage += CoverageOf(fit, points) / 2;
+    coverage += CoverageOf(fit, points) / static_cast<double>(cases.size());
   }
   EXPECT_GT(coverage, 0.8);
   EXPECT_LT(coverage, 0.98);

@@ -194,6 +194,23 @@ TEST(SurfaceSigma, UsesTheStretchOfTheFit) {
   EXPECT_GT(std::abs(counted() - stretched), 0.2 * stretched);
 }
 
+// With as many parameters as half of the points, the choice of smoothness makes sigma a factor of
+// sqrt(2) too small.
+TEST(SurfaceSigma, AllowsForTheChoiceOfSmoothness) {
+  const HSplineSurface surface = Refined(Closure::kOpen);
+  const std::vector<Vec2> at = PointsAt(20, 3).uv;
+  for (const int count : {100, 5000}) {
+    const SurfaceSigma sigma(surface, PointsAt(count, 1).Columns(), {},
+                             {.noise_mm = 1, .weight = 1e-6, .lengths_mm = {1, 1}});
+    const double factor = 1 / std::sqrt(1 - sigma.degrees_of_freedom() / count);
+    ASSERT_LT(factor, 7);
+    ASSERT_GT(factor, count == 100 ? 1.1 : 1);
+    for (std::size_t k = 0; k < at.size(); ++k) {
+      EXPECT_DOUBLE_EQ(sigma.OfChosen(at)[k], factor * sigma.At(at)[k]);
+    }
+  }
+}
+
 TEST(SurfaceSigma, IsLargeWhereNothingIsDetermined) {
   const HSplineSurface surface = Refined(Closure::kOpen);
   const SigmaOptions options{.noise_mm = 1, .weight = 0, .lengths_mm = {1, 1}};

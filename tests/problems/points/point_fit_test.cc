@@ -66,6 +66,31 @@ TEST(PointFit, PlaneParametersFindTheHeightField) {
   }
 }
 
+// Lengths of the report are those of the file, whatever the scale in which heights are fitted.
+TEST(PointFit, TheReportHasTheUnitsOfTheHeights) {
+  Random random(3);
+  for (const double unit : {1.0, 1000.0}) {
+    PointTable lines;
+    for (int k = 0; k < 8000; ++k) {
+      const double x = (k % 100 + 0.5) / 100, y = (k / 100 + 0.5) / 80;
+      const double offset = 0.6 * std::sin(1.7 * (k / 100) * (k / 100));  // looks random
+      const double height = 10 * std::sin(5 * x + 1) * std::cos(4 * y) + offset;
+      lines.positions.emplace_back(x, y, unit * 0.05 * std::round(height / 0.05));
+    }
+    const AutoReport report = FitPoints(lines, {}, {}).fit.automatic.value();
+    EXPECT_NEAR(report.run_offset_mm, unit * 0.42, unit * 0.1);
+    EXPECT_NEAR(report.noise_mm, unit * 0.42, unit * 0.1);
+    PointTable rounded;
+    for (int k = 0; k < 4000; ++k) {
+      const double x = random.Uniform(), y = random.Uniform();
+      rounded.positions.emplace_back(
+          x, y, unit * 0.5 * std::round(20 * std::sin(5 * x + 1) * std::cos(4 * y)));
+    }
+    EXPECT_NEAR(FitPoints(rounded, {}, {}).fit.automatic.value().lattice_mm, unit * 0.5,
+                unit * 1e-9);
+  }
+}
+
 TEST(PointFit, CylinderParametersCloseTheHead) {
   const PointFitOptions options{
       .closure = Closure::kPeriodicU,
@@ -89,7 +114,7 @@ TEST(PointFit, SigmaIsComputedIfRequested) {
   const PointTable table = ParsePointTable(UvCsv(Scattered(FrankePoint, 3000, 1e-3, 1)), "test");
   const PointFit result = FitPoints(table, options, {});
   ASSERT_EQ(result.sigma_mm.size(), 3000u);
-  EXPECT_EQ(result.sigma->At(result.fit.uv), result.sigma_mm);
+  EXPECT_EQ(result.sigma->OfChosen(result.fit.uv), result.sigma_mm);
   const std::vector<Vec2> places = {{0.5, 0.5}, {0, 0}};
   const std::vector<double> sigma = result.sigma->At(places);
   EXPECT_GT(sigma[0], 1e-5);
