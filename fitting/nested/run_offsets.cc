@@ -4,11 +4,13 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdio>
+#include <cstdint>
+#include <iterator>
 #include <utility>
 
+#include "fitting/least_squares/patch_energy.h"
 #include "fitting/nested/nested_solve.h"
-#include "fitting/nested/nested_surface.h"
+#include "fitting/nested/nested_space.h"
 #include "fitting/nested/unresolved_detail.h"
 #include "surfaces/base/quantile.h"
 
@@ -18,7 +20,8 @@ namespace {
 constexpr int kFolds = 5;     // of runs; each is predicted from the others
 constexpr int kSegments = 8;  // of a run, whose medians show how alike its residuals are
 constexpr int kDraws = 6;     // of made-up offsets; their mean square has an error of some 20 %
-constexpr std::size_t kSample = 20000;  // points; more change the offsets by less than they cost
+// Points. Trades time for the error of a run's median, which is small beside that of few runs.
+constexpr std::size_t kSample = 20000;
 
 // The points of a sample with their runs.
 struct SampledRuns {
@@ -95,7 +98,19 @@ SegmentMedians MediansOf(const SampledRuns& sampled, const std::vector<double>& 
   return medians;
 }
 
-// How far runs lie off as a whole, by one-way analysis of variance over their segments.
+// The mean of each run's segments; 0 for a run without points.
+std::vector<double> MeansOf(const SegmentMedians& medians) {
+  std::vector<double> means;
+  for (const auto& run : medians) {
+    std::vector<double> known;
+    std::ranges::copy_if(run, std::back_inserter(known),
+                         [](double median) { return std::isfinite(median); });
+    means.push_back(known.empty() ? 0 : ArithmeticMean(known));
+  }
+  return means;
+}
+
+// The distances of whole runs, by one-way analysis of variance over their segments.
 struct RunScatter {
   double square_of_means = kNaN;  // mean square of the runs' means
   double common_square = kNaN;    // the part of it that is common to all parts of a run
@@ -157,16 +172,17 @@ class RunFits {
   // least: near the best one what the surface lacks along the runs may still hide the offsets.
   double Share() const { return std::max(best_.share, last_.share); }
 
+  // Returns whether the others predict hardly anything of how far a run lies off its neighbours. A
+  // surface with ridges along the lines is predicted, if some lines fall on each ridge.
+  bool AreUnpredictable() {
+    constexpr double kLeastLeft = 0.5;  // of the variance of independent offsets; ridges leave 0.1
+    return best_.common_square > kLeastLeft * SquareBetweenRuns();
+  }
+
   // The runs' offsets from the fit to all of them.
   RunOffsets Find() {
-    const SegmentMedians medians = MediansOf(sampled_, Fit({}), runs_.count);
-    RunOffsets offsets{.runs = runs_, .offset_mm = {}};
-    for (const auto& run : medians) {
-      std::vector<double> known;
-      std::ranges::copy_if(run, std::back_inserter(known),
-                           [](double median) { return std::isfinite(median); });
-      offsets.offset_mm.push_back(known.empty() ? 0 : ArithmeticMean(known));
-    }
+    RunOffsets offsets{.runs = runs_,
+                       .offset_mm = MeansOf(MediansOf(sampled_, Fit({}), runs_.count))};
     offsets.sd_mm = std::sqrt(best_.common_square);
     offsets.left_square = SquareFollowed(offsets.sd_mm);
     return offsets;
@@ -175,6 +191,21 @@ class RunFits {
  private:
   void Begin(std::vector<char> left_out) {
     solve_.Begin(space_, PointChoice{.left_out = std::move(left_out)});
+  }
+
+  // The variance of independent offsets that have the second differences of consecutive runs.
+  double SquareBetweenRuns() const {
+    constexpr double kOfDifferences = 6;  // 1 + 4 + 1
+    std::vector<double> values;
+    for (const Vec3& value : sampled_.points.value) {
+      values.push_back(value[0]);
+    }
+    const std::vector<double> mean = MeansOf(MediansOf(sampled_, values, runs_.count));
+    double sum = 0;
+    for (std::size_t r = 2; r < mean.size(); ++r) {
+      sum += std::pow(mean[r] - 2 * mean[r - 1] + mean[r - 2], 2);
+    }
+    return sum / (kOfDifferences * static_cast<double>(mean.size() - 2));
   }
 
   // Residuals along the channel of all sampled points, from a fit to those that are not left out.
@@ -215,8 +246,9 @@ class RunFits {
     return MediansOf(sampled_, predicted, runs_.count);
   }
 
-  // The mean square of the surface through made-up offsets of random sign: what a surface with
-  // this weight follows of the true ones.
+  // The mean square of what a surface with this weight follows of the offsets, by made-up ones of
+  // random sign. The product with the surface instead of its square includes its bias on average
+  // (Wahba 1983).
   double SquareFollowed(double sd_mm) {
     const std::vector<Vec3> values = sampled_.points.value;
     double sum = 0;
@@ -262,7 +294,8 @@ std::optional<RunOffsets> FindRunOffsets(const NestedPoints& points, const HSpli
   }
   RunFits fits(points, std::move(runs), start);
   fits.ChooseWeight();
-  return fits.Share() > kLeastShare ? std::optional(fits.Find()) : std::nullopt;
+  return fits.Share() > kLeastShare && fits.AreUnpredictable() ? std::optional(fits.Find())
+                                                               : std::nullopt;
 }
 
 void Level(const RunOffsets& offsets, NestedPoints& points) {

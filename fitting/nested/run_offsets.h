@@ -27,8 +27,8 @@ struct RunOffsets {
 // Finds the offsets of runs from a surface that is as smooth as predicts runs best that it was not
 // fitted to. Cross-validation by single points cannot do this, since each point has neighbours with
 // its own error. Returns nothing without runs, for points in more than one channel or with
-// weights, and where most of what a run's parts lie off the surface is not common to the run: that
-// is detail of the surface.
+// weights, where most of what a run's parts lie off the surface is not common to the run, and where
+// runs predict each other: that is detail of the surface.
 //   start: the surface from which the points are displaced.
 std::optional<RunOffsets> FindRunOffsets(const NestedPoints& points, const HSplineSurface& start);
 

@@ -259,6 +259,18 @@ TEST(ErrorStructure, OffsetsOfLinesAreNotFollowed) {
   EXPECT_NEAR(fit.rms_mm, std::sqrt(sum / static_cast<double>(lines.uv.size())), 1e-9);
 }
 
+// Ridges along the lines, five lines to each, are the surface.
+TEST(ErrorStructure, RidgesAlongLinesAreNoOffsets) {
+  Random random(14);
+  Points lines;
+  for (int k = 0; k < 8000; ++k) {
+    const Vec2 at((k % 100 + 0.5) / 100, (k / 100 + 0.5) / 80);
+    lines.Add(at, 0.05 * std::sin(2 * std::numbers::pi * 16 * at.y()) + 0.1 * Hills(at) +
+                      1e-3 * random.Normal());
+  }
+  EXPECT_EQ(lines.Fit().report.runs, 0);
+}
+
 // Rough ground along lines differs from line to line, but not along the whole of them.
 TEST(ErrorStructure, RoughGroundAlongLinesIsNoOffset) {
   const testing::Fractal ground;
