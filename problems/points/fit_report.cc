@@ -153,8 +153,8 @@ std::string AutoText(const AutoReport& r, std::string_view unit) {
   }
   if (r.runs > 0) {
     text += fmt::format(
-        "{} runs of the file, as lines of a scan, lie {} (standard deviation) off each other: the "
-        "surface is fitted to them as if they did not\n",
+        "{} runs of the file, as lines of a scan, are {} (standard deviation) off each other and "
+        "were levelled; shuffle the rows to fit them as they are\n",
         r.runs, LengthText(r.run_offset_mm, unit, 3));
   }
   if (SharesErrors(r)) {

@@ -80,6 +80,7 @@ TEST(PointFit, TheReportHasTheUnitsOfTheHeights) {
     const AutoReport report = FitPoints(lines, {}, {}).fit.automatic.value();
     EXPECT_NEAR(report.run_offset_mm, unit * 0.42, unit * 0.1);
     EXPECT_NEAR(report.noise_mm, unit * 0.42, unit * 0.1);
+    EXPECT_THAT(AutoText(report, ""), HasSubstr("80 runs of the file"));
     PointTable rounded;
     for (int k = 0; k < 4000; ++k) {
       const double x = random.Uniform(), y = random.Uniform();
