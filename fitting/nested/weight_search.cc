@@ -207,7 +207,8 @@ NestedWeight NestedWeightSearch::SmoothWhileFits(const std::function<double()>& 
   const double smoothest = kMaxWeightRatio * solve_.EvenWeight();
   Finish();
   double least = misfit(), weight = best_.weight;
-  for (double next = weight * kFactor; next < smoothest; next *= kFactor) {
+  double next = weight * kFactor;
+  while (next < smoothest) {
     Take(next);
     const double square = misfit();
     least = std::min(least, square);
@@ -215,6 +216,7 @@ NestedWeight NestedWeightSearch::SmoothWhileFits(const std::function<double()>& 
       break;
     }
     weight = next;
+    next *= kFactor;
   }
   Take(weight);
   return Finish();
