@@ -56,7 +56,9 @@ SampledRuns Sample(const NestedPoints& points, const FileRuns& runs) {
   some.periodic_u = points.periodic_u;
   some.channels = points.channels;
   some.axes = points.axes;
-  const std::size_t every = std::max<std::size_t>(points.size() / kSample, 1);
+  constexpr std::size_t kPerRun = 32;  // on average, so that no run is left without points
+  const std::size_t wanted = std::max<std::size_t>(kSample, kPerRun * runs.count),
+                    every = std::max<std::size_t>(points.size() / wanted, 1);
   for (std::size_t k = 0; k < points.size(); k += every) {
     if (runs.run[k] != FileRuns::kNone) {
       some.uv.push_back(points.uv[k]);

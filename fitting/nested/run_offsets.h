@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Offsets that all points of a run of the file share, as the lines of a scanner or a survey that
-// drifts from line to line. A surface that is smooth along the lines alone would follow them.
+// drifts from line to line. Points on a line agree with each other, so a fit to the points would
+// follow each line.
 #pragma once
 
 #include <optional>
